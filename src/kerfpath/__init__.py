@@ -10,6 +10,7 @@ __version__ = "0.1.0"
 
 TYPE_CHECKING = False  # as that of typing, which takes longer to load than this module
 if TYPE_CHECKING:
+    from kerfpath.acceleration_table import AccelerationTable as AccelerationTable
     from kerfpath.auditor import audit as audit
     from kerfpath.certificate import Certify as Certify
     from kerfpath.comfort import Band as Band
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from kerfpath.windows import GammaWindow as GammaWindow
 
 _HOME = {
+    "AccelerationTable": "acceleration_table",
     "AuditFailed": "errors",
     "Band": "comfort",
     "Certify": "certificate",

@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import Array, Ints, floats, freeze, positive, scalar, short_repr
 from kerfpath.dynamics import ArmDynamics
 from kerfpath.errors import InputError
@@ -80,13 +81,53 @@ class VelocityLimit(RateLimit):
     order = 1
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AccelerationLimit(RateLimit):
-    """Bound on the acceleration of each joint, thus on the change of its increment (6)."""
+    """Bound on the acceleration of each joint, thus on the change of its increment (6).
 
-    __slots__ = ()
+    It may depend on the configuration. Then `bound`, and all that follows from it, is what holds
+    at any configuration; `at` says how much more may be used where.
+
+    Parameters
+    ----------
+    table : AccelerationTable, optional
+        Bounds of some joints by configuration; they replace those of `bound`.
+
+    Raises
+    ------
+    InputError
+        As `RateLimit`, and a table for joints that there are not.
+    """
+
     quantity = "acceleration"
     eta = "eta_a"
     order = 2
+
+    table: AccelerationTable | None = None
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        RateLimit.__post_init__(self)
+        if self.table is not None:
+            self.table.require_arm(len(self.bound))
+            object.__setattr__(self, "bound", self.table.into(self.bound, self.table.least))
+
+    def at(self, q: Array) -> Array:
+        """Return the bound at configurations q (..., n) rad; (n,) where it does not depend on q."""
+        return self.bound if self.table is None else self.table.into(self.bound, self.table.at(q))
+
+    def usable_at(self, q: Array) -> Array:
+        """Return the usable part of the bound at q, shaped as by `at`."""
+        return freeze(self.share * self.at(q))
+
+    def most_per_interval(self, dt: float) -> Array:
+        """Return a bound (n,) rad on the change of an increment that holds for any motion.
+
+        It is the largest that any configuration allows, where `per_interval` is the smallest.
+        """
+        most = self.bound if self.table is None else self.table.into(self.bound, self.table.most)
+        return freeze(self.share * most * dt**self.order)
 
 
 class JerkLimit(RateLimit):
@@ -184,6 +225,7 @@ class Limits:
         eta_a: float = 1.0,
         torque: TorqueLimit | None = None,
         jerk: JerkLimit | None = None,
+        table: AccelerationTable | None = None,
     ) -> Limits:
         """Return the limits of a robot, with the shares of them that may be used.
 
@@ -194,6 +236,8 @@ class Limits:
             Share of the velocity and acceleration limits that may be used.
         torque : TorqueLimit, optional
         jerk : JerkLimit, optional
+        table : AccelerationTable, optional
+            Accelerations of some joints by configuration, which replace those of `acceleration`.
 
         Raises
         ------
@@ -203,7 +247,7 @@ class Limits:
         return cls(
             velocity=VelocityLimit(bound=positive(velocity, "velocity", (None,)), share=eta_v),
             acceleration=AccelerationLimit(
-                bound=positive(acceleration, "acceleration", (None,)), share=eta_a
+                bound=positive(acceleration, "acceleration", (None,)), share=eta_a, table=table
             ),
             torque=torque,
             jerk=jerk,

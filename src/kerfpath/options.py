@@ -373,8 +373,14 @@ class PlanOptions(Settings):
 
     def limits(self, robot: Robot) -> Limits:
         """Return the limits on a robot's motion, with the shares of them that may be used."""
-        rates = Limits.of(*robot.speed_limits(), eta_v=self.eta_v, eta_a=self.eta_a)
-        return replace(rates, torque=robot.torque_limit(), jerk=robot.jerk_limit())
+        return Limits.of(
+            *robot.speed_limits(),
+            eta_v=self.eta_v,
+            eta_a=self.eta_a,
+            torque=robot.torque_limit(),
+            jerk=robot.jerk_limit(),
+            table=robot.limits.acceleration_table,
+        )
 
     @property
     def without_penalties(self) -> PlanOptions:

@@ -58,6 +58,7 @@ def retime(
     dt: ArrayLike,
     limits: Limits,
     *,
+    q: ArrayLike | None = None,
     periodic: bool = False,
 ) -> Array:
     """Return the interval times with the least sum, none below `dt`, that keep the limits.
@@ -72,6 +73,8 @@ def retime(
     dt : float or (K-1,) s
         Commanded time of each interval.
     limits : Limits
+    q : (K, n) rad, optional
+        Joints at the nodes; needed where accelerations depend on them.
     periodic : bool
         Whether the last interval is followed by the first; else the path begins and ends at speed.
 
@@ -82,17 +85,17 @@ def retime(
     Raises
     ------
     InputError
-        Arrays whose shapes do not fit, NaN, times that are not positive, or limits on torque or
-        jerk.
+        Arrays whose shapes do not fit, NaN, times that are not positive, limits on torque or jerk,
+        or no joints beside accelerations that depend on them.
     """
     if limits.torque is not None or limits.jerk is not None:
         raise InputError(
             "retime: supports limits on velocity and acceleration only; remove those on torque "
             "and jerk"
         )
-    dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
+    dq, dt, velocity = _inputs(dq, dt, limits)
     least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
-    rows = _rows(dq / acceleration, least, periodic)
+    rows = _rows(dq, _accelerations(limits, q, len(dq), periodic), least, periodic)
     tau = _stretch_times(rows, least)
     if np.array_equal(tau, least):
         return freeze(tau)
@@ -114,6 +117,7 @@ def feed(
     limits: Limits,
     length: ArrayLike,
     *,
+    q: ArrayLike | None = None,
     periodic: bool = False,
 ) -> Feed:
     """Return where the times `tau` keep the commanded speed, and what limits the slowest interval.
@@ -122,7 +126,7 @@ def feed(
     ----------
     tau : (K-1,) s
         The result of `retime`.
-    dt, dq, limits, periodic
+    dt, dq, limits, q, periodic
         As in `retime`.
     length : (K-1,) m
         Length of the path in each interval.
@@ -132,7 +136,8 @@ def feed(
     InputError
         As `retime`.
     """
-    dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
+    dq, dt, velocity = _inputs(dq, dt, limits)
+    acceleration = _accelerations(limits, q, len(dq), periodic)
     tau = positive(tau, "tau", dt.shape)
     length = floats(length, "length", dt.shape)
     at_speed = tau <= dt * (1 + LIMIT_ROUNDING)
@@ -143,7 +148,7 @@ def feed(
     v, a = (np.abs(rates) for rates in rates_of(dq, tau, periodic=periodic))
     before, after = meetings(len(dq), periodic=periodic)
     speed = v[k] / velocity
-    change = (a[(before == k) | (after == k)] / acceleration).max(axis=0, initial=0.0)
+    change = (a / acceleration)[(before == k) | (after == k)].max(axis=0, initial=0.0)
     fast = speed.max() >= change.max()
     return Feed(
         full=full,
@@ -154,7 +159,7 @@ def feed(
     )
 
 
-def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array, Array, Array]:
+def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array, Array]:
     dq = floats(dq, "dq", (None, None))
     intervals, n = dq.shape
     if intervals == 0 or n == 0:
@@ -163,19 +168,31 @@ def _inputs(dq: ArrayLike, dt: ArrayLike, limits: Limits) -> tuple[Array, Array,
         dt = np.full(intervals, dt)
     limits.require_joints(n)
     dt = positive(dt, "dt", (intervals,))
-    return dq, dt, limits.velocity.usable, limits.acceleration.usable
+    return dq, dt, limits.velocity.usable
 
 
-def _rows(step: Array, least: Array, periodic: bool) -> _LimitRows:
-    """Return the acceleration limits that can bind; step (K-1, n) s^2 is dq over acceleration.
+def _accelerations(limits: Limits, q: ArrayLike | None, intervals: int, periodic: bool) -> Array:
+    """Return the largest accelerations (M, n) where intervals meet, or those of any node (n,)."""
+    if limits.acceleration.table is None:
+        return limits.acceleration.usable
+    if q is None:
+        raise InputError(
+            "retime: accelerations depend on the configuration; give the joints at the nodes, q="
+        )
+    nodes = floats(q, "q", (intervals + 1, len(limits.acceleration.bound)))
+    return limits.acceleration.usable_at(nodes[meetings(intervals, periodic=periodic)[1]])
+
+
+def _rows(dq: Array, acceleration: Array, least: Array, periodic: bool) -> _LimitRows:
+    """Return the acceleration limits that can bind, from increments dq (K-1, n) rad.
 
     Of the rows of one node, the one with the larger b and the smaller a implies the other.
     """
-    before, after = meetings(len(step), periodic=periodic)
-    a = np.hstack([step[before], -step[before]])
-    b = np.hstack([step[after], -step[after]])
-    early, late = least[before, None], least[after, None]
-    kept = np.maximum(b, 0) / late + np.maximum(-a, 0) / early > (early + late) / 2
+    before, after = meetings(len(dq), periodic=periodic)
+    early, late = dq[before] / acceleration, dq[after] / acceleration
+    a, b = np.hstack([early, -early]), np.hstack([late, -late])
+    first, second = least[before, None], least[after, None]
+    kept = np.maximum(b, 0) / second + np.maximum(-a, 0) / first > (first + second) / 2
     number = np.arange(a.shape[1])
     for i in number:
         implied = (b >= b[:, [i]]) & (a <= a[:, [i]]) & kept

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from tests.arms import arm_with_masses
-from tests.refiner.test_refine import _distances, _margins, _moved, _random_model
+from tests.refiner.test_refine import _distances, _limited, _margins, _moved, _random_model
 
 from kerfpath import Contour, InputError, NoFeasiblePath, fastest_speed, pareto, plan, refine
 from kerfpath.auditor import audit, checks
@@ -133,7 +133,7 @@ def test_the_program_holds_torques_and_jerks_as_they_are_defined(periodic):
         jerk = JerkLimit(bound=np.abs(jerks(still)).max(axis=0) * 1.02)
         sharp = np.abs(rates.of(np.diff(model.q, axis=0))[1]).max(axis=0) * 1.05
         rates = replace(rates, limits=Limits.of(rates.limits.velocity.bound, sharp, jerk=jerk))
-        model = replace(model, torque=linear)
+        model = replace(_limited(model, rates), torque=linear)
 
         def margins(d, model=model, rates=rates, jerk=jerk, linear=linear, jerks=jerks):
             share = linear.share + sum(

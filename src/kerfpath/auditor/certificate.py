@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath.arrays import Array
+from kerfpath.auditor.acceleration import most_accelerations
 from kerfpath.auditor.cover import DEEPEST_CELL, Places, Reachable, covered
 from kerfpath.auditor.enclosure import POSTURES
 from kerfpath.auditor.jets import UNIT
@@ -127,7 +128,8 @@ def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
     ):
         if not known:
             raise CertificateRefused(f"certificates do not apply to {what}")
-    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    limits, (velocity, _) = robot.joint_limits(), robot.speed_limits()
+    acceleration = most_accelerations(robot)
     endless = np.asarray(robot.endless, dtype=bool)
     lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
     if not (np.isfinite(lower) & np.isfinite(upper)).all():

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.auditor.acceleration import scarcity
 from kerfpath.auditor.chain import JointChain
 from kerfpath.auditor.enclosure import fixed_poses, joints_of, require_closed_form, seen_from_foot
 from kerfpath.auditor.jets import Interval, Jet, angle_from, constant, exact
@@ -302,7 +303,9 @@ def rates_along(
     Returns
     -------
     velocity, acceleration : (P, n) rad/s, rad/s^2
-        Infinite where nothing is proved: close to a singularity, or out of reach.
+        Infinite where nothing is proved: close to a singularity, or out of reach. Where limits on
+        the acceleration depend on the configuration, it is multiplied by the limit that holds
+        everywhere over the least limit on the way: so its share of the former is that of its own.
 
     Raises
     ------
@@ -326,6 +329,8 @@ def rates_along(
         if depth == 0:
             posture = _nearest(joints, none, q)
         fast, sharp = _rates(joints, none, posture[k])
+        if robot.limits.acceleration_table is not None:
+            sharp = sharp * scarcity(robot, *_spans(joints, none, posture[k], q[k]))
         done = ((fast <= enough[0]) & (sharp <= enough[1])).all(axis=1) | (depth == deepest)
         np.maximum.at(velocity, k[done], fast[done])
         np.maximum.at(acceleration, k[done], sharp[done])
@@ -411,6 +416,16 @@ def _rates(joints: list[Jet], none: Bools, posture: Ints) -> tuple[Array, Array]
             size = np.broadcast_to(held.magnitude(), none.shape).reshape(8, -1)[posture, rows]
             found[kind, :, i] = np.where(np.isnan(size) | absent, np.inf, size)
     return found[0], found[1]
+
+
+def _spans(joints: list[Jet], none: Bools, posture: Ints, q: Array) -> tuple[Array, Array]:
+    """Return the ends (S, 2) of joints 2 and 3 over spans, on the turns of q (S, n)."""
+    rows, ends = np.arange(len(posture)), np.empty((2, len(posture), 2))
+    for i, joint in enumerate(joints[1:3]):
+        for end, held in enumerate((joint.value.lo, joint.value.hi)):
+            ends[end, :, i] = np.broadcast_to(held, none.shape).reshape(8, -1)[posture, rows]
+    turn = 2 * np.pi * np.round((q[:, 1:3] - ends.mean(axis=0)) / (2 * np.pi))
+    return ends[0] + turn, ends[1] + turn
 
 
 def _polynomial(coefficients: Array, time: Jet) -> Jet:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, require_instance, scalar
+from kerfpath.auditor.acceleration import largest_accelerations
 from kerfpath.auditor.between import BetweenNodes, bound_between_nodes
 from kerfpath.auditor.certificate import bound_checks
 from kerfpath.auditor.chain import chain_of
@@ -66,7 +67,8 @@ SHARE_SLACK = 1e-6
 
 def rate_checks(plan: Plan, reached: BetweenNodes, rounding: Rounding | None) -> list[Check]:
     """Return the checks of joint velocities, accelerations, torques and jerks."""
-    velocity, acceleration = plan.robot.speed_limits()
+    velocity, _ = plan.robot.speed_limits()
+    acceleration = largest_accelerations(plan.robot, plan.q[1:-1])
     eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
     dt = np.diff(plan.time)
     dq = joint_increments(plan)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, Ints, floats
+from kerfpath.auditor.acceleration import least_accelerations
 from kerfpath.auditor.chain import JointChain, chain_of
 from kerfpath.auditor.collision import collision_along
 from kerfpath.auditor.motion import follow
@@ -157,7 +158,7 @@ def transfer_checks(
 
 def _least_times(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
     """Return the least times (m-1,) s of straight motions by |dq| (m-1, n) rad, stop to stop."""
-    velocity, acceleration = robot.speed_limits()
+    velocity, acceleration = robot.speed_limits()[0], least_accelerations(robot)
     still = 1e-300
     v = (eta_v * velocity / np.maximum(step, still)).min(axis=1)
     a = (eta_a * acceleration / np.maximum(step, still)).min(axis=1)

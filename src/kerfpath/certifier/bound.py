@@ -233,7 +233,7 @@ def _steps_of(plan: Plan) -> Steps:
     return Steps(
         weight=asked.weights,
         velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-        acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+        acceleration=limits.acceleration.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
         metric=METRIC_CODES[asked.metric],
         endless=plan.robot.endless,
     )

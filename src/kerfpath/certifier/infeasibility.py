@@ -112,7 +112,7 @@ class MotionTest:
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
             velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-            acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            acceleration=limits.acceleration.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
             metric=MANHATTAN,
             endless=self._endless,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,16 @@ from rich.markup import escape
 from kerfpath.arrays import Array
 from kerfpath.cli.show import out, print_json, table, write_text
 from kerfpath.errors import InputError
-from kerfpath.robots import ExternalProduct, KnownAxis, external, external_ids, robot, robot_ids
+from kerfpath.robots import (
+    ExternalProduct,
+    KnownAxis,
+    acceleration_table_of,
+    external,
+    external_ids,
+    robot,
+    robot_ids,
+    robots_with_tables,
+)
 
 UNITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
 """Limits of external axes, and the end of their units after mm or deg."""
@@ -163,6 +173,14 @@ def show_robot(name: str) -> None:
         "velocity deg/s": _degrees(r.velocity),
         "acceleration deg/s^2": _degrees(r.acceleration),
     }
+    by_place = [
+        {
+            "joint": joint,
+            "least_deg_s2": float(np.degrees(values.min()).round(9)),
+            "most_deg_s2": float(np.degrees(values.max()).round(9)),
+        }
+        for joint, values in _table_of(name).items()
+    ]
     couplings = [
         {
             "what": c.name,
@@ -190,6 +208,7 @@ def show_robot(name: str) -> None:
             "limits_missing": r.limits_missing,
             "acceleration_source": r.acceleration_source,
             "acceleration_ratio": r.acceleration_ratio,
+            "acceleration_table": by_place,
             "notes": list(r.notes),
             "frames": r.frames,
             "sources": r.sources,
@@ -216,10 +235,20 @@ def show_robot(name: str) -> None:
         out.print(f"acceleration: not published{ratio}")
     else:
         out.print(f"acceleration: {escape(r.acceleration_source)}")
+    for of in by_place:
+        out.print(
+            f"acceleration of joint {of['joint']} by joints 2 and 3: {of['least_deg_s2']:g} to "
+            f'{of["most_deg_s2"]:g} deg/s^2, with acceleration_table = "library"'
+        )
     for note in r.notes:
         out.print(f"note: {escape(note)}")
     for what, source in r.sources.items():
         out.print(f"source of {what.replace('_', ' ')}: {escape(source)}")
+
+
+def _table_of(name: str) -> Mapping[int, Array]:
+    """Return the accelerations by configuration that the library has of a robot; none: empty."""
+    return acceleration_table_of(name).limits if name in robots_with_tables() else {}
 
 
 def write_urdf(name: str | None, path: Path) -> None:

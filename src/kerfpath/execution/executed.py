@@ -299,7 +299,7 @@ def run_along(
         q=q,
         T=T,
         velocity_share=v / velocity,
-        acceleration_share=a / acceleration,
+        acceleration_share=a / robot.acceleration_at(q),
         torque_share=_torque_share(robot, q, v, a),
         velocity_bound=np.inf,
         acceleration_bound=np.inf,
@@ -475,7 +475,7 @@ def timing_of(
     InputError
         The posture does not reach some samples of the run (NaN).
     """
-    velocity, acceleration = run.robot.speed_limits()
+    velocity, acceleration = run.robot.velocity_limits(), run.robot.acceleration_at(run.q)
     first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
     if not run.reached:
         raise InputError("timing_of: expected a run within reach, got joints that are NaN")
@@ -504,7 +504,7 @@ def fastest_rates(
         Samples, in programmed time.
     first, second : (m, n)
         Velocities and accelerations of the joints there, at the programmed speed.
-    limits : tuple of (n,), (n,)
+    limits : tuple of (n,), (n,) or (m, n)
         Those that the joints may have.
     most : float
         Largest rate.

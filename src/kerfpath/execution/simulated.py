@@ -230,7 +230,7 @@ def _commanded(
         for name in ("q", "first", "second")
     )
     time = time[once]
-    rate = fastest_rates(time, v, a, robot.speed_limits())
+    rate = fastest_rates(time, v, a, (robot.velocity_limits(), robot.acceleration_at(q)))
     again = max(piece.again for piece in pieces)
     return even_joints(clock_of(time, rate), time, rate, q, v, STEP, again=again)
 
@@ -257,8 +257,8 @@ def _along_path(
     run = run_along(
         moves, robot, T_base_part=np.eye(4), T_flange_tip=T_flange_tip, controller=controller
     )
-    velocity, acceleration = robot.speed_limits()
-    v, a = run.velocity_share * velocity, run.acceleration_share * acceleration
+    v = run.velocity_share * robot.velocity_limits()
+    a = run.acceleration_share * robot.acceleration_at(run.q)
     if np.isnan(a).any():
         k = int(np.flatnonzero(np.isnan(a).any(axis=1))[0])
         at = first + int(np.searchsorted(run.tool_motion.time, run.time[k]))

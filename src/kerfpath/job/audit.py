@@ -268,7 +268,8 @@ def check_run(job: Job, cut: ReadCut, made: Plan, path: Contour, digits: Roundin
         return [*checks_of_unknown(job, "the robot stops at every node")]
     run = max(runs, key=lambda each: each.most)
     dq, dt = np.diff(made.q, axis=0), np.diff(made.time)
-    velocity, acceleration = job.robot.speed_limits()
+    velocity = job.robot.velocity_limits()
+    acceleration = job.robot.acceleration_at(made.q[1:-1])
     allowed = (
         (digits.of_velocity(dq, dt) / velocity).max(),
         (digits.of_acceleration(dq, dt) / acceleration).max(initial=0.0),

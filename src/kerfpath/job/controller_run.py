@@ -251,7 +251,7 @@ def _shares(done: Record, robot: Robot) -> tuple[Array, Array]:
     """Return the shares of the limits of velocity and acceleration, (M, n) each."""
     period = float(np.diff(done.time).mean())
     dq = np.diff(done.q, axis=0, prepend=done.q[:1], append=done.q[-1:]) / period
-    velocity, acceleration = robot.speed_limits()
+    velocity, acceleration = robot.velocity_limits(), robot.acceleration_at(done.q)
     return np.abs(dq[:-1]) / velocity, np.abs(np.diff(dq, axis=0)) / period / acceleration
 
 

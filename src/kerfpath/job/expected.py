@@ -391,11 +391,11 @@ def _options(
 def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
     """Return the plan in the least time within its limits; with the given times if they agree."""
     limits = plan.settings.limits(plan.robot)
-    tau = retime(plan.increments, dt, limits)
+    tau = retime(plan.increments, dt, limits, q=plan.q)
     time, found = np.concatenate([[0.0], np.cumsum(tau)]), np.diff(said)
     if said[0] == 0 and (np.abs(found - tau) <= RETIMED * tau).all():
         time, tau = said, found
-    dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s))
+    dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s), q=plan.q)
     return replace(plan, time=time, feed=dips)
 
 

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, create_model
 
 from kerfpath import __version__
+from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.auditor import BOUND, Check, Level, Unit
 from kerfpath.cell import Cell, caveats
@@ -125,6 +126,15 @@ class DynamicsData(TypedDict):
     load_inertia_kg_m2: list[Row] | None
 
 
+class AccelerationTableData(TypedDict):
+    """Acceleration limits of joints over joints 2 and 3, by the number of the joint."""
+
+    joint_2_rad: Row
+    joint_3_rad: Row
+    limits_rad_s2: dict[str, list[Row]]
+    source: str
+
+
 class LimitsData(TypedDict):
     """The limits of the arm's joints that were used."""
 
@@ -135,6 +145,7 @@ class LimitsData(TypedDict):
     acceleration_rad_s2: Row
     acceleration_source: str
     couplings: list[CouplingData]
+    acceleration_table: NotRequired[AccelerationTableData]
     jerk_rad_s3: NotRequired[list[float | None]]
     dynamics: NotRequired[DynamicsData]
 
@@ -593,12 +604,19 @@ def _unpacked(data: ArrayData, kind: str, where: str) -> NDArray[np.generic]:
 
 
 # -----------------------------------------------------------------------------
-# Limits on torque and jerk in plan.json.
+# Limits that depend on the configuration, and limits on torque and jerk, in plan.json.
 
 
 def dynamics_entry(robot: Robot) -> LimitsData:
-    """Return the keys that limits on torque and jerk add to those of the arm's joints."""
+    """Return the keys that a table, torques and jerks add to the limits of the arm's joints."""
     entry: LimitsData = {}  # type: ignore[typeddict-item]  # some keys of it, to be added
+    if (table := robot.limits.acceleration_table) is not None:
+        entry["acceleration_table"] = {
+            "joint_2_rad": table.joint_2.tolist(),
+            "joint_3_rad": table.joint_3.tolist(),
+            "limits_rad_s2": {str(joint): of.tolist() for joint, of in table.limits.items()},
+            "source": table.source,
+        }
     if robot.limits.jerk is not None:
         entry["jerk_rad_s3"] = [float(x) if np.isfinite(x) else None for x in robot.limits.jerk]
     load, own = robot.dynamics.load, robot.dynamics.inertia
@@ -618,13 +636,26 @@ def dynamics_entry(robot: Robot) -> LimitsData:
 
 
 def with_dynamics(entry: LimitsData, robot: Robot) -> Robot:
-    """Return the arm with the limits on torque and jerk of such an entry.
+    """Return the arm with the table and the limits on torque and jerk of such an entry.
 
     Raises
     ------
     InputError
-        The load or the masses are not possible.
+        The table, the load or the masses are not possible.
     """
+    if (rows := entry.get("acceleration_table")) is not None:
+        if not all(joint.isdecimal() for joint in rows["limits_rad_s2"]):
+            raise InputError(
+                "acceleration_table: expected the numbers of joints, got "
+                f"{', '.join(rows['limits_rad_s2'])}"
+            )
+        table = AccelerationTable(
+            joint_2=np.array(rows["joint_2_rad"]),
+            joint_3=np.array(rows["joint_3_rad"]),
+            limits={int(joint): np.array(of) for joint, of in rows["limits_rad_s2"].items()},
+            source=rows["source"],
+        )
+        robot = replace(robot, limits=replace(robot.limits, acceleration_table=table))
     jerk = entry.get("jerk_rad_s3")
     if jerk is not None:
         robot = robot.with_limits(jerk=[np.inf if value is None else value for value in jerk])

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.change_table import ChangeTable, fill_change
 from kerfpath.kernels.continuous import (
     RELAXED,
     Steps,
@@ -68,8 +69,8 @@ class _Offers(NamedTuple):
 
 @jit
 def advance(
-    targets: Targets, steps: Steps, cost: Array, tail: Array, acceleration: Array, first: Ints,
-    alike: Alike, out: Beam,
+    targets: Targets, steps: Steps, cost: Array, tail: Array, acceleration: Array,
+    table: ChangeTable, first: Ints, alike: Alike, out: Beam,
 ) -> int:  # fmt: skip
     """Fill the beam from vertices `first` of the first layer; returns the layers reached.
 
@@ -93,9 +94,13 @@ def advance(
         made = variable(0)
         for relaxed in RELAXED:
             free = np.inf if k == 1 else relaxed
-            for i in range(n):
-                change[i] = free * acceleration[i]
             for b in range(out.size[k - 1]):
+                if len(table.joint_2) > 0:
+                    fill_change(table, x[b, 1], x[b, 2], acceleration, change)
+                else:
+                    change[:] = acceleration
+                for i in range(n):
+                    change[i] *= free
                 made = _offer(
                     targets, steps, cost, tail, change, k, b, x[b], before[b],
                     out.cost[k - 1, b], made, offers,

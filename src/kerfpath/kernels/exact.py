@@ -33,6 +33,7 @@ from kerfpath.kernels.search import (
     SortedLayers,
     combined,
     distance,
+    fill_change_at,
     fill_increment,
     is_shut,
     late_cost,
@@ -96,10 +97,14 @@ def _begin(
 
 @jit_inline
 def _breaks(
-    layers: SortedLayers, aim: Aim, p: int, dq_before: Array, dq: Array, room: TorqueRoom
-) -> bool:
-    """Whether (6) or a torque limit forbids the increment dq after dq_before at vertex p."""
-    if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
+    layers: SortedLayers, aim: Aim, p: int, dq_before: Array, dq: Array, change: Array,
+    room: TorqueRoom,
+) -> bool:  # fmt: skip
+    """Whether (6) or a torque limit forbids the increment dq after dq_before at vertex p.
+
+    change (n,) rad is the largest change of the increment there.
+    """
+    if acceleration_excess(dq, dq_before, change) >= 0:
         return True
     return torque_excess(aim.torque, layers.given, p, dq_before, dq, room) >= 0
 
@@ -107,7 +112,7 @@ def _breaks(
 @jit_inline
 def _predecessor(
     layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int, step: float, dq: Array,
-    rest: float, bound: float, room: TorqueRoom,
+    rest: float, bound: float, change: Array, room: TorqueRoom,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Find which of the states a..b of p, cheapest first, continues by dq at the least cost.
 
@@ -115,21 +120,22 @@ def _predecessor(
     bound; the cost up to and with the step; and the least cost over the bound.
     """
     if aim.timed:
-        return _quickest(states, a, b, aim, step, dq, rest, bound)
+        return _quickest(states, a, b, aim, step, dq, rest, bound, change)
     for s in range(a, b):
         d = combined(aim.minimax, states.d[s], step)
         f = combined(aim.minimax, d, rest)
         if f > bound:
             return -1, np.inf, f
-        if states.parent[s] < 0 or not _breaks(layers, aim, p, states.dq[s], dq, room):
+        if states.parent[s] < 0 or not _breaks(layers, aim, p, states.dq[s], dq, change, room):
             return s, d, np.inf
     return -1, np.inf, np.inf
 
 
 @jit_inline
 def _quickest(
-    states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float
-) -> tuple[int, float, float]:
+    states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float,
+    change: Array,
+) -> tuple[int, float, float]:  # fmt: skip
     """As `_predecessor`, where a change of the increment takes time."""
     best, best_d, over, paid = -1, np.inf, np.inf, 0.0
     if aim.lost.penalty > 0:
@@ -144,9 +150,9 @@ def _quickest(
             break
         time = 0.0
         if states.parent[s] >= 0:
-            time = acceleration_time(dq, states.dq[s], aim.acceleration)
+            time = acceleration_time(dq, states.dq[s], change)
         elif states.parent[s] == LEAPT:
-            time = _braking_time(dq, aim)
+            time = _braking_time(dq, aim, change)
         d = max(d, time) if aim.minimax else d + max(0.0, late_cost(aim.lost, time) - paid)
         f = combined(aim.minimax, d, rest)
         if f > bound:
@@ -157,11 +163,14 @@ def _quickest(
 
 
 @jit_inline
-def _braking_time(dq: Array, aim: Aim) -> float:
-    """Least time, in node intervals, for the change between dq and any step over `aim.velocity`."""
+def _braking_time(dq: Array, aim: Aim, change: Array) -> float:
+    """Least time, in node intervals, for the change between dq and any step over `aim.velocity`.
+
+    change (n,) rad is the largest change of the increment there.
+    """
     least = np.inf
     for i in range(len(dq)):
-        least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / aim.acceleration[i])
+        least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / change[i])
     return sqrt(least)
 
 
@@ -175,9 +184,10 @@ def _add_leaps(
     They cost no more than any such step from any of the states before.
     """
     a, b, d, lowest = layers.start[k], layers.start[k + 1], np.inf, np.inf
-    paid = late_cost(aim.lost, aim.lost.stretch)
+    paid, change = late_cost(aim.lost, aim.lost.stretch), np.empty(len(layers.endless))
     for s in range(len(before.vertex)):
-        time = _braking_time(before.dq[s], aim) if before.parent[s] >= 0 else 0.0
+        fill_change_at(layers, aim, before.vertex[s], change)
+        time = _braking_time(before.dq[s], aim, change) if before.parent[s] >= 0 else 0.0
         d = min(d, before.d[s] + aim.lost.leap + max(0.0, late_cost(aim.lost, time) - paid))
     f = d + layers.cost[a:b] + h[a:b]
     leapt = a + np.flatnonzero(f <= bound)
@@ -199,6 +209,7 @@ def _fill_from(
     if a == b:
         return count, lowest
     closes = len(seam) > 0 and k == len(layers.start) - 3
+    fill_change_at(layers, aim, p, scratch.change)
     some, dq = fill_candidates(layers, aim, states, a, b, k, p, scratch), scratch.dq
     for v in range(some):
         j = scratch.vertex[v]
@@ -215,10 +226,12 @@ def _fill_from(
         if is_shut(layers.shut, first, last, j):  # tested last: few edges get here
             continue
         fill_increment(layers, p, j, dq)
-        if closes and _breaks(layers, aim, j, dq, seam, scratch.torque):
-            continue
+        if closes:
+            fill_change_at(layers, aim, j, scratch.seam)
+            if _breaks(layers, aim, j, dq, seam, scratch.seam, scratch.torque):
+                continue
         s, cost, dropped = _predecessor(
-            layers, aim, states, a, b, p, step, dq, h[j], bound, scratch.torque
+            layers, aim, states, a, b, p, step, dq, h[j], bound, scratch.change, scratch.torque
         )
         lowest = min(lowest, dropped)
         if s >= 0:
@@ -254,8 +267,8 @@ def _extend(
     n, lowest = len(layers.endless), np.inf
     begin, end, first = layers.start[k + 1], layers.start[k + 2], states.first
     scratch = Scratch(
-        np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n),
-        torque_room(len(aim.torque.bound)),
+        np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n), torque_room(len(aim.torque.bound)),
     )  # fmt: skip
     room = 2 * (end - begin)
     vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
@@ -371,10 +384,12 @@ def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tup
     """
     n, shut = len(layers.endless), 0
     counts, dq, room = np.zeros((3, n), np.int64), np.empty(n), torque_room(len(aim.torque.bound))
+    change = np.empty(n)
     for i in range(len(states.first) - 1):
         a, b, p = states.first[i], states.first[i + 1], layers.start[k - 1] + i
         if a == b:
             continue
+        fill_change_at(layers, aim, p, change)
         first, last = shut_edges(layers, p)
         for j in range(layers.start[k], layers.start[k + 1]):
             fill_increment(layers, p, j, dq)
@@ -387,7 +402,7 @@ def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tup
                 continue
             for s in range(a, b):
                 if states.parent[s] >= 0:
-                    excess = acceleration_excess(dq, states.dq[s], aim.acceleration)
+                    excess = acceleration_excess(dq, states.dq[s], change)
                     if excess >= 0:
                         counts[1, excess] += 1
                         continue

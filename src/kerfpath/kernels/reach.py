@@ -22,12 +22,13 @@ __all__ = ["fill_candidates"]
 
 @jit_inline
 def _fill_reach(
-    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int,
+    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int, change: Array,
     out_to: Array, out_by: Array,
 ) -> None:  # fmt: skip
     """Fill the box, middle (n,) and half width (n,) rad, that the states a..b of p can reach.
 
-    It contains every vertex that (5) and, for any of these states, (6) allow.
+    It contains every vertex that (5) and, for any of these states, (6) allow; change (n,) rad is
+    the largest change of the increment at p.
     """
     free = aim.timed
     for s in range(a, b):
@@ -38,7 +39,7 @@ def _fill_reach(
             least = most = states.dq[a, i]
             for s in range(a + 1, b):
                 least, most = min(least, states.dq[s, i]), max(most, states.dq[s, i])
-            low, high = max(low, least - aim.acceleration[i]), min(high, most + aim.acceleration[i])
+            low, high = max(low, least - change[i]), min(high, most + change[i])
         to = layers.q[i, p] + (low + high) / 2
         out_to[i] = wrap_angle(to) if layers.endless[i] else to
         out_by[i] = (high - low) / 2 + 2 * LIMIT_TOLERANCE
@@ -71,9 +72,9 @@ def fill_candidates(
 ) -> int:  # fmt: skip
     """Fill the vertices in the box that the states a..b of p can reach; return their number.
 
-    They include every vertex that (5) and (6) allow, and few others.
+    They include every vertex that (5) and (6) allow, and few others. out.change is filled already.
     """
-    _fill_reach(layers, aim, states, a, b, p, out.to, out.by)
+    _fill_reach(layers, aim, states, a, b, p, out.change, out.to, out.by)
     count, end = 0, layers.start[k + 2]
     for low, high in runs(layers.start, layers.low, layers.high, k, p):
         for v in range(low, high, 64):

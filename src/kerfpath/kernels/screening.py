@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath.arrays import Array
+from kerfpath.kernels.change_table import NO_TABLE, ChangeTable, fill_change
 from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.metric import EUCLID, MANHATTAN
 
@@ -46,12 +47,14 @@ class Energy(NamedTuple):
     velocity: Array
     """(n,) rad: largest increment."""
     acceleration: Array
-    """(n,) rad: largest change of an increment."""
+    """(n,) rad: largest change of an increment, at any configuration."""
     lower: Array
     """(n,) rad; infinite for none."""
     upper: Array
     """(n,) rad"""
     price: float
+    table: ChangeTable = NO_TABLE
+    """By how much larger changes of an increment may be at a configuration."""
 
 
 @jit_part
@@ -109,7 +112,18 @@ def _outside(x: float, lower: float, upper: float) -> tuple[float, float]:
 
 
 @jit_part
-def _value(q: Array, energy: Energy, scale: float, slope: Array, curve: Array, x: Array) -> float:
+def _fill_change(energy: Energy, q: Array, out: Array) -> None:
+    """Fill the largest change (n,) rad of an increment at joints q (n,)."""
+    if len(energy.table.joint_2) > 0:
+        fill_change(energy.table, q[1], q[2], energy.acceleration, out)
+    else:
+        out[:] = energy.acceleration
+
+
+@jit_part
+def _value(
+    q: Array, energy: Energy, scale: float, slope: Array, curve: Array, x: Array, most: Array
+) -> float:
     """Energy of a motion q (K, n); the other arrays (n,) are scratch."""
     K, n = q.shape
     value = 0.0
@@ -119,13 +133,14 @@ def _value(q: Array, energy: Energy, scale: float, slope: Array, curve: Array, x
             value += 0.5 * OF_RANGES * beyond * beyond
         if k == K - 1:
             break
+        _fill_change(energy, q[k], most)
         for i in range(n):
             x[i] = q[k + 1, i] - q[k, i]
             beyond, _ = _beyond(x[i] / energy.velocity[i], KEPT[0])
             value += 0.5 * energy.price * beyond * beyond
             if k > 0:
                 change = x[i] - q[k, i] + q[k - 1, i]
-                beyond, _ = _beyond(change / energy.acceleration[i], KEPT[1])
+                beyond, _ = _beyond(change / most[i], KEPT[1])
                 value += 0.5 * energy.price * beyond * beyond
         length, _ = _distance(x, energy, slope, curve)
         value += scale * (length / scale) ** OF_LARGEST / OF_LARGEST if energy.minimax else length
@@ -139,11 +154,11 @@ def energies(q: Array, energy: Energy, scale: Array, out: Array) -> None:
     With (15) a motion has the typical largest distance scale (S,).
     """
     n = q.shape[2]
-    slope, curve, x = np.empty(n), np.empty(n), np.empty(n)
+    slope, curve, x, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for s in range(len(q)):
         out[s] = np.inf
         if np.isfinite(q[s]).all():
-            out[s] = _value(q[s], energy, scale[s], slope, curve, x)
+            out[s] = _value(q[s], energy, scale[s], slope, curve, x, most)
 
 
 @jit_part
@@ -156,7 +171,7 @@ def _fill_model(
     first, second (K, n): derivatives of the joints by gamma. by_joint (K, n) is scratch.
     """
     K, n = q.shape
-    slope, curve, x = np.empty(n), np.empty(n), np.empty(n)
+    slope, curve, x, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     by_joint[:] = 0.0
     bands[:] = 0.0
     for k in range(K - 1):
@@ -189,12 +204,13 @@ def _fill_model(
         bands[k + 1, 0] += own_next - coupled * along_next * along_next
         bands[k + 1, 1] -= across - coupled * along * along_next
     for k in range(1, K - 1):
+        _fill_change(energy, q[k], most)
         for i in range(n):
             change = q[k + 1, i] - 2 * q[k, i] + q[k - 1, i]
-            beyond, sign = _beyond(change / energy.acceleration[i], KEPT[1])
+            beyond, sign = _beyond(change / most[i], KEPT[1])
             if beyond > 0.0:
-                force = energy.price * beyond * sign / energy.acceleration[i]
-                stiff = energy.price / energy.acceleration[i] ** 2
+                force = energy.price * beyond * sign / most[i]
+                stiff = energy.price / most[i] ** 2
                 by_joint[k + 1, i] += force
                 by_joint[k, i] -= 2 * force
                 by_joint[k - 1, i] += force

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.change_table import NO_TABLE, ChangeTable, fill_change
 from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.limits import acceleration_excess, exceeds
 from kerfpath.kernels.metric import apart, extend, finish, increment, wrap_angle
@@ -25,6 +26,7 @@ __all__ = [
     "combined",
     "count_within",
     "distance",
+    "fill_change_at",
     "fill_increment",
     "fill_key",
     "first_from",
@@ -88,13 +90,15 @@ class Aim(NamedTuple):
     velocity: Array
     """(n,) rad: largest increment of each joint."""
     acceleration: Array
-    """(n,) rad: largest change of its increment."""
+    """(n,) rad: largest change of its increment, at any vertex."""
     cap: float = np.inf
     """Largest distance, and largest cost of a vertex, allowed."""
     timed: bool = False
     """Whether (6), instead of forbidding a change, takes the node intervals in which it would hold:
     with (15) they are the cost, with (14) they cost what `lost` says."""
     lost: LostTime = LostTime()
+    table: ChangeTable = NO_TABLE
+    """By how much larger changes may be at a vertex."""
     torque: TorqueTest = NO_TORQUE
     """Torque limits, kept by the exact recursion if it is not `timed`."""
 
@@ -221,6 +225,16 @@ def late_cost(lost: LostTime, time: float) -> float:
 
 
 @jit_inline
+def fill_change_at(layers: SortedLayers, aim: Aim, p: int, out: Array) -> None:
+    """Fill the largest change (n,) rad of the increment at vertex p."""
+    if len(aim.table.joint_2) > 0:
+        fill_change(aim.table, layers.given[1, p], layers.given[2, p], aim.acceleration, out)
+    else:
+        for i in range(len(out)):
+            out[i] = aim.acceleration[i]
+
+
+@jit_inline
 def fill_increment(layers: SortedLayers, p: int, j: int, out_dq: Array) -> None:
     """Fill the joint increment (n,) from vertex p to vertex j."""
     for i in range(len(layers.endless)):
@@ -229,15 +243,17 @@ def fill_increment(layers: SortedLayers, p: int, j: int, out_dq: Array) -> None:
 
 @jit_inline
 def _offer(
-    layers: SortedLayers, aim: Aim, k: int, p: int, dq: Array, dq_before: Array,
+    layers: SortedLayers, aim: Aim, k: int, p: int, dq: Array, dq_before: Array, change: Array,
     out_dist: Array, out_before: Ints, out_free: Array,
 ) -> None:  # fmt: skip
     """Offer vertex p of layer k as predecessor to the vertices its edges lead to, step (2b).
 
-    out_free keeps the best offer regardless of acceleration; dq, dq_before (n,) are scratch arrays.
+    out_free keeps the best offer regardless of acceleration; dq, dq_before, change (n,) are scratch
+    arrays.
     """
     if k > 0:
         fill_increment(layers, out_before[p], p, dq_before)
+        fill_change_at(layers, aim, p, change)
     (a, b), (c, d) = runs(layers.start, layers.low, layers.high, k, p)
     first, last = shut_edges(layers, p)
     for v in range(a, b + d - c):
@@ -252,20 +268,20 @@ def _offer(
         out_free[j] = min(out_free[j], cost)
         if k > 0:
             fill_increment(layers, p, j, dq)
-            if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
+            if acceleration_excess(dq, dq_before, change) >= 0:
                 continue
         out_dist[j], out_before[j] = cost, p
 
 
 @jit_inline
 def _step(
-    layers: SortedLayers, aim: Aim, k: int, dq: Array, dq_before: Array,
+    layers: SortedLayers, aim: Aim, k: int, dq: Array, dq_before: Array, change: Array,
     out_dist: Array, out_before: Ints, out_free: Array,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Step (2) from layer k to the next: whether any vertex was reached, and any was refused."""
     for p in range(layers.start[k], layers.start[k + 1]):
         if out_dist[p] < np.inf:
-            _offer(layers, aim, k, p, dq, dq_before, out_dist, out_before, out_free)
+            _offer(layers, aim, k, p, dq, dq_before, change, out_dist, out_before, out_free)
     reached = turned_away = False
     for j in range(layers.start[k + 1], layers.start[k + 2]):
         turned_away |= out_free[j] < out_dist[j]
@@ -286,11 +302,12 @@ def path_planning(
     exact).
     """
     n, K, turned_away = len(layers.endless), len(layers.start) - 1, False
-    dq, dq_before, free = np.empty(n), np.empty(n), np.full(len(layers.low), np.inf)
+    dq, dq_before, change = np.empty(n), np.empty(n), np.empty(n)
+    free = np.full(len(layers.low), np.inf)
     first = layers.start[1]
     out_dist[:first] = layers.cost[:first]
     for k in range(K - 1):
-        reached, away = _step(layers, aim, k, dq, dq_before, out_dist, out_before, free)
+        reached, away = _step(layers, aim, k, dq, dq_before, change, out_dist, out_before, free)
         turned_away |= away
         if not reached:
             return k + 1, turned_away

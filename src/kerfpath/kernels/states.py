@@ -47,6 +47,10 @@ class Scratch(NamedTuple):
     """(n,): middle of the box."""
     by: Array
     """(n,): half width of the box."""
+    change: Array
+    """(n,): largest change of the increment at a vertex."""
+    seam: Array
+    """(n,): the same at the vertex that closes a path."""
     torque: TorqueRoom
 
 

@@ -27,7 +27,7 @@ from kerfpath.planner.screening import Screening, Stage
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 from kerfpath.robots import lowest_joint
-from kerfpath.search import METRIC_CODES, Branches, Course, Valleys
+from kerfpath.search import METRIC_CODES, Branches, Course, Valleys, change_table
 from kerfpath.windows import inside
 
 STEP, LEAST_STEPS = np.radians(10.0), 8
@@ -95,6 +95,7 @@ class Courses:
                 lower=freeze(np.where(limits.endless, -np.inf, limits.lower)),
                 upper=freeze(np.where(limits.endless, np.inf, limits.upper)),
                 price=0.0,
+                table=change_table(s.limits(robot)),
             ),
             quickest=quickest,
         )

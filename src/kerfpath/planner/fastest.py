@@ -15,7 +15,6 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.external_motion import along_a_course, faster_motions
@@ -226,7 +225,7 @@ def relaxations(
         q=graph.q,
         start=graph.start,
         dt=node_interval(contour, speed),
-        limits=Limits.of(*robot.speed_limits(), eta_v=eta_v, eta_a=eta_a),
+        limits=PlanOptions(eta_v=eta_v, eta_a=eta_a).limits(robot),
         endless=robot.endless,
     )
     return find_relaxations(problem)

@@ -236,8 +236,7 @@ def _with_least_times(task: Task, made: Plan) -> Plan:
     They also keep the velocities on the straight moves between the nodes that the arm can follow.
     """
     limits, asked = task.problem.limits, least_times(made)
-    tau = retime(
-        made.increments, np.where(asked < np.inf, np.maximum(asked, task.dt), task.dt), limits
-    )
-    dips = feed(tau, task.dt, made.increments, limits, np.diff(made.contour.s))
+    least = np.where(asked < np.inf, np.maximum(asked, task.dt), task.dt)
+    tau = retime(made.increments, least, limits, q=made.q)
+    dips = feed(tau, task.dt, made.increments, limits, np.diff(made.contour.s), q=made.q)
     return replace(made, time=np.concatenate([[0.0], np.cumsum(tau)]), feed=dips)

@@ -129,8 +129,11 @@ def limit_shares(task: Task, made: Plan) -> tuple[float, float]:
     limits = task.problem.limits
     v, a = rates_of(made.increments, np.full(len(task.contour) - 1, task.dt))
     fast, sharp = (
-        float((np.abs(rates) / limit.usable).max(initial=0.0))
-        for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
+        float((np.abs(rates) / usable).max(initial=0.0))
+        for rates, usable in (
+            (v, limits.velocity.usable),
+            (a, limits.acceleration.usable_at(made.unwrapped[1:-1])),
+        )
     )
     return fast, sharp
 

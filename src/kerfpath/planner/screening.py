@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.kernels.change_table import change_factors
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, wrap
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.kernels.turns import JointLimits
@@ -240,7 +241,8 @@ class Screening:
         """
         dq = np.diff(q, axis=1)
         fast = np.abs(dq / self.energy.velocity).max(axis=2)
-        sharp = np.abs(np.diff(dq, axis=1) / self.energy.acceleration).max(axis=2)
+        most = self.energy.acceleration * change_factors(self.energy.table, q[:, 1:-1])
+        sharp = np.abs(np.diff(dq, axis=1) / most).max(axis=2)
         out = np.maximum(self.energy.lower - q, q - self.energy.upper).max(axis=(1, 2))
         out = np.where(out > NEGLIGIBLE, out, 0.0)
         if self.quickest:

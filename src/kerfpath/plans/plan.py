@@ -481,7 +481,7 @@ class Plan:
     @property
     def acceleration_share(self) -> Array:
         """Second difference at the inner nodes over the acceleration limit, (K-2, n), signed."""
-        return freeze(self._rates[1] / self.robot.speed_limits()[1])
+        return freeze(self._rates[1] / self.robot.acceleration_at(self.q[1:-1]))
 
     @property
     def criteria(self) -> Criteria:

@@ -347,7 +347,8 @@ class ArcLimits:
 
     def _shares(self, q: Array, dt: Array) -> tuple[Array, Array]:
         """Return shares of the velocity (m, n) and acceleration (m - 1, n) limits."""
-        velocity, acceleration = self.program.robot.speed_limits()
+        robot = self.program.robot
+        velocity, acceleration = robot.velocity_limits(), robot.acceleration_at(q[1:-1])
         rate = np.diff(q, axis=0) / dt[:, None]
         change = np.diff(rate, axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
         return np.abs(rate) / velocity, np.abs(change) / acceleration

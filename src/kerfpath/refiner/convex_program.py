@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.refiner.rates import LinearTorque, RateLimits
+from kerfpath.refiner.rates import LinearAcceleration, LinearTorque, RateLimits
 from kerfpath.refiner.rows import ConstraintRows, Sparse, span_of, wide
 from kerfpath.search import Metric
 
@@ -53,6 +53,8 @@ class LinearModel:
     metric : str
     cap : float
         Largest distance that is allowed; infinite: any.
+    acceleration : LinearAcceleration
+        Largest accelerations where intervals meet.
     torque : LinearTorque or None
         Shares of the torque limits; None if there are no such limits.
     """
@@ -71,6 +73,7 @@ class LinearModel:
     weight: Array
     metric: Metric
     cap: float
+    acceleration: LinearAcceleration
     torque: LinearTorque | None = None
 
     __repr__ = short_repr
@@ -85,6 +88,7 @@ class LinearModel:
         return replace(
             self,
             q=self.q - self.moved(delta),
+            acceleration=self.acceleration.through(delta),
             torque=None if torque is None else torque._replace(share=torque.at(-delta[:, 0])),
         )
 
@@ -174,10 +178,13 @@ def _limits(
     joints = np.arange(n)
     before, after = ((joints + n * at[:, None]).ravel() for at in meetings)
     A = _scaled(np.repeat(1 / span, n), V[after] - V[before])
+    most = model.acceleration.limit
     held = [
         (v / rates.velocity, _scaled(1 / rates.velocity.ravel(), V), owner[:edges]),
-        (a / rates.acceleration, _scaled(1 / rates.acceleration.ravel(), A), owner[edges:]),
+        (a / most, _scaled(1 / most.ravel(), A), owner[edges:]),
     ]
+    # What the limit itself gains, in shares of it, is taken off on both sides.
+    gained = _accelerations(model, model.acceleration)
     if model.torque is not None:
         held.append((model.torque.share, _torques(model, model.torque), owner[edges:]))
     if rates.limits.jerk is not None and len(jerk := rates.jerk_share(dq)):
@@ -186,14 +193,28 @@ def _limits(
         there = (here + n) % A.shape[0]
         per = np.outer(1 / rates.tau[over], 1 / rates.limits.jerk.usable).ravel()
         held.append((jerk, _scaled(per, A[there] - A[here]), owner[:edges][over]))
-    for value, per_share, of in held:
+    for i, (value, per_share, of) in enumerate(held):
         share = value.ravel()
         for sign in (1.0, -1.0):
+            used = sign * per_share
+            if i == 1 and gained is not None:
+                used = used - gained
             if beyond is None:
-                rows.at_most(sign * share, sign * per_share, 1 - MARGIN)
+                rows.at_most(sign * share, used, 1 - MARGIN)
             else:
                 spread = beyond[np.repeat(of, n)]
-                rows.hold(wide(sign * per_share, rows.variables) - spread, 1 - sign * share)
+                rows.hold(wide(used, rows.variables) - spread, 1 - sign * share)
+
+
+def _accelerations(model: LinearModel, limit: LinearAcceleration) -> Sparse | None:
+    """Return the slopes (M n, K F) of the acceleration limits as shares of them; None: constant."""
+    if not limit.slope.any():
+        return None
+    M, n, F = limit.slope.shape
+    values = limit.slope * model.radius[limit.node, None] / limit.limit[..., None]
+    row = np.repeat(np.arange(M * n), F)
+    column = np.repeat(limit.node, n * F) * F + np.tile(np.arange(F), M * n)
+    return _matrix(values.ravel(), row, column, (M * n, model.radius.size))
 
 
 def _torques(model: LinearModel, torque: LinearTorque) -> Sparse:

@@ -289,6 +289,7 @@ class Descent:
             weight=self.weight,
             metric=self.metric,
             cap=self.cap,
+            acceleration=self.rates.linear_acceleration(at.q, slope),
             torque=self.rates.linear_torque(at.q, slope[..., 0]),
         )
 

@@ -7,11 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kerfpath.acceleration_table import OVER
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.limits import Limits, jerks_of, meetings, rates_of
 
 DERIVATIVE_STEP = 1e-4
 """rad: central differences are exact to 1e-8 of the third derivative, rounding to 1e-11."""
+STEEPEST = 100.0
+"""1/rad: largest relative change of an acceleration limit with a joint that is one."""
+LEAST_SHARE = 0.1
+"""Least share of an acceleration limit that a linear model of it may fall to."""
 
 
 class KeptShares(NamedTuple):
@@ -22,6 +27,22 @@ class KeptShares(NamedTuple):
 
     velocity: Array
     acceleration: Array
+
+
+class LinearAcceleration(NamedTuple):
+    """Largest accelerations at nodes, as linear functions of changes of the free variables.
+
+    limit : (M, n) rad/s^2, at no change; node : (M,) int; slope : (M, n, F), by its variables.
+    """
+
+    limit: Array
+    node: Ints
+    slope: Array
+
+    def through(self, delta: Array) -> LinearAcceleration:
+        """Return the limits, made after changes delta (K, F), with their values before them."""
+        before = self.limit - (self.slope @ delta[self.node][..., None])[..., 0]
+        return self._replace(limit=np.maximum(before, LEAST_SHARE * self.limit))
 
 
 class LinearTorque(NamedTuple):
@@ -79,10 +100,13 @@ class RateLimits:
         """Return the velocities (K-1, n) and accelerations (M, n) of increments (K-1, n) rad."""
         return rates_of(dq, self.tau, periodic=self.periodic)
 
-    def shares(self, dq: Array) -> tuple[Array, Array]:
-        """Return the shares of the velocity limits (K-1, n) and the acceleration limits (M, n)."""
-        v, a = (np.abs(rates) for rates in self.of(dq))
-        return v / self.velocity, a / self.acceleration
+    def shares(self, q: Array) -> tuple[Array, Array]:
+        """Return the shares of the limits at joints q (K, n) rad, not wrapped.
+
+        They are those of the velocities (K-1, n) and of the accelerations (M, n).
+        """
+        v, a = (np.abs(rates) for rates in self.of(np.diff(q, axis=0)))
+        return v / self.velocity, a / self.acceleration(q)
 
     @property
     def velocity(self) -> Array:
@@ -90,13 +114,29 @@ class RateLimits:
         share = np.ones(len(self.tau))[:, None] if self.kept is None else self.kept.velocity
         return np.asarray(share * self.limits.velocity.usable)
 
-    @property
-    def acceleration(self) -> Array:
-        """Largest accelerations where intervals meet, (M, n) rad/s^2 (a rail: m/s^2)."""
-        share = (
-            np.ones(len(self.meetings[0]))[:, None] if self.kept is None else self.kept.acceleration
-        )
-        return np.asarray(share * self.limits.acceleration.usable)
+    def acceleration(self, q: Array) -> Array:
+        """Return the largest accelerations where intervals meet, (M, n) rad/s^2 (a rail: m/s^2).
+
+        q (K, n) rad are the joints, on which they may depend.
+        """
+        after = self.meetings[1]
+        share = np.ones(len(after))[:, None] if self.kept is None else self.kept.acceleration
+        return np.asarray(share * self.limits.acceleration.usable_at(q[after]))
+
+    def linear_acceleration(self, q: Array, slope: Array) -> LinearAcceleration:
+        """Return the largest accelerations as linear functions of the free variables.
+
+        slope (K, n, F) is the derivative of the joints q (K, n) rad by them.
+        """
+        after, table = self.meetings[1], self.limits.acceleration.table
+        at, limit, slopes = q[after], self.acceleration(q), np.zeros((len(after), *slope.shape[1:]))
+        for joint in () if table is None else OVER:
+            step = DERIVATIVE_STEP * (np.arange(q.shape[1]) == joint)
+            ahead, behind = (self.limits.acceleration.at(at + sign * step) for sign in (1.0, -1.0))
+            rise = (ahead - behind) / (2 * DERIVATIVE_STEP) / self.limits.acceleration.at(at)
+            rise[np.abs(rise) > STEEPEST] = 0.0  # at the end of the table
+            slopes += (limit * rise)[..., None] * slope[after, joint, None]
+        return LinearAcceleration(limit, after, slopes)
 
     def torque_share(self, q: Array) -> Array:
         """Return the signed shares (M, n) of the torque limits at joints (K, n) rad; (0, n): none.
@@ -163,4 +203,4 @@ class RateLimits:
         """Return the absolute shares of all limits, one row for each place."""
         dq = np.diff(q, axis=0)
         torque, jerk = np.abs(self.torque_share(q)), np.abs(self.jerk_share(dq))
-        return *self.shares(dq), torque, jerk
+        return *self.shares(q), torque, jerk

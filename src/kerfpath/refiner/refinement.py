@@ -239,7 +239,7 @@ def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
         if start.outside == np.inf:
             return None
         found = descent.gentlest(start)
-        fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
+        fast, sharp = descent.rates.shares(found.q)
         shorter, binding = _binding(descent, fast, sharp)
         plan = replace(_plan_with_motion(plan, found), time=plan.time * shorter)
         if shorter > 1 - SAME_INTERVAL:
@@ -386,7 +386,7 @@ def _closest(descent: Descent, at: MotionState) -> str:
     if at.outside == np.inf:
         return "the motion leaves the reach of its posture between the nodes"
     rates = descent.rates
-    fast, sharp = rates.shares(np.diff(at.q, axis=0))
+    fast, sharp = rates.shares(at.q)
     if at.outside > 0:
         return f"a joint stays out of its range by {np.degrees(at.outside):.3g} deg"
     after = rates.meetings[1]

@@ -4,8 +4,10 @@ from kerfpath.robots.arm import Arm as Arm
 from kerfpath.robots.arm import Solutions as Solutions
 from kerfpath.robots.axis_3 import AXIS_3 as AXIS_3
 from kerfpath.robots.catalogue import acceleration_ratios as acceleration_ratios
+from kerfpath.robots.catalogue import acceleration_table_of as acceleration_table_of
 from kerfpath.robots.catalogue import responses_of as responses_of
 from kerfpath.robots.catalogue import robot_ids as robot_ids
+from kerfpath.robots.catalogue import robots_with_tables as robots_with_tables
 from kerfpath.robots.described import SNAPS as SNAPS
 from kerfpath.robots.enclosure import Enclosure as Enclosure
 from kerfpath.robots.external_axes import MOST_EXTERNAL as MOST_EXTERNAL

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath.acceleration_table import LIMIT, AccelerationTable
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.names import nearest, squeezed
@@ -69,6 +70,33 @@ def responses_of(name: str) -> dict[str, dict[str, Any]]:
         The robot is unknown.
     """
     return dict(entry(name).get("response", {}))
+
+
+@cache
+def robots_with_tables() -> tuple[str, ...]:
+    """Return the ids of the robots whose accelerations the library has by configuration."""
+    return tuple(one for one in robot_ids() if "acceleration_table" in entry(one))
+
+
+def acceleration_table_of(name: str) -> AccelerationTable:
+    """Return the accelerations of a robot of the library by configuration.
+
+    Raises
+    ------
+    InputError
+        The robot is unknown, or the library has no table of it.
+    """
+    if (table := entry(name).get("acceleration_table")) is None:
+        raise InputError(
+            f"robot {name!r}: the library has no table of accelerations for it, only for "
+            f"{' and '.join(robots_with_tables())}; give one"
+        )
+    return AccelerationTable.from_degrees(
+        table["joint_2_deg"],
+        table["joint_3_deg"],
+        {joint: table[key] for joint in range(1, 8) if (key := LIMIT.format(joint)) in table},
+        source=table["source"],
+    )
 
 
 def arm_of(data: Mapping[str, Any]) -> Arm:

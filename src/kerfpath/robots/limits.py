@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.acceleration_table import OVER, AccelerationTable
 from kerfpath.arrays import Array, Bools, bools, floats, positive, short_repr
 from kerfpath.errors import InputError
-from kerfpath.limits import JerkLimit
+from kerfpath.limits import AccelerationLimit, JerkLimit
 
 
 class LimitKeywords(TypedDict, total=False):
@@ -83,7 +84,10 @@ class RobotLimits:
     velocity : (n,) rad/s or None
         Largest joint speeds.
     acceleration : (n,) rad/s^2 or None
-        Largest joint accelerations; most makers publish none.
+        Largest joint accelerations; most makers publish none. Those of the joints of a table are
+        its least values, which hold at any configuration.
+    acceleration_table : AccelerationTable or None
+        Largest accelerations of some joints of the arm by configuration.
     jerk : (arm joints,) rad/s^3 or None
         Largest joint jerks; plans keep them where they are known.
     torque : (arm joints,) N m or None
@@ -98,6 +102,7 @@ class RobotLimits:
     upper: Array | None = None
     velocity: Array | None = None
     acceleration: Array | None = None
+    acceleration_table: AccelerationTable | None = None
     jerk: Array | None = None
     torque: Array | None = None
     endless: Bools = field(default_factory=lambda: np.zeros((), bool))
@@ -111,7 +116,9 @@ class RobotLimits:
         Raises
         ------
         InputError
-            An array of another shape, a speed or another rate that is not positive.
+            An array of another shape, a speed or another rate that is not positive; or a table of
+            accelerations for joints that the arm does not have, for joints 2 and 3 without end, or
+            beside unknown accelerations.
         """
 
         def known(cast: Callable[..., Array], name: str, size: int = joints) -> Array | None:
@@ -120,23 +127,38 @@ class RobotLimits:
 
         for coupling in self.couplings:
             floats(coupling.row, "coupling row", (joints,))
+        endless = bools(for_each(self.endless, joints), "endless", (joints,))
+        acceleration, table = known(positive, "acceleration"), self.acceleration_table
+        if table is not None:
+            table.require_arm(arm)
+            if acceleration is None:
+                raise InputError(
+                    "acceleration table: expected the accelerations of the other joints, too, got "
+                    "none; give acceleration="
+                )
+            if endless[list(OVER)].any():
+                raise InputError(
+                    "acceleration table: expected joints 2 and 3 with ranges, got an endless one, "
+                    "whose turns the table does not know"
+                )
+            acceleration = AccelerationLimit(bound=acceleration, table=table).bound
         return replace(
             self,
-            endless=bools(for_each(self.endless, joints), "endless", (joints,)),
+            endless=endless,
             lower=known(floats, "lower"),
             upper=known(floats, "upper"),
             velocity=known(positive, "velocity"),
-            acceleration=known(positive, "acceleration"),
+            acceleration=acceleration,
             jerk=known(lambda *of: JerkLimit(bound=floats(*of, infinite=True)).bound, "jerk", arm),
             torque=known(positive, "torque", arm),
         )
 
     def of_arm(self, n: int) -> RobotLimits:
         """Return the limits of the first n joints, those of the arm."""
-        first = {
+        first: dict[str, Any] = {
             each.name: values[:n]
             for each in fields(self)
-            if each.name != "couplings" and (values := getattr(self, each.name)) is not None
+            if isinstance(values := getattr(self, each.name), np.ndarray)
         }
         return replace(
             self, **first, couplings=tuple(replace(c, row=c.row[:n]) for c in self.couplings)

@@ -11,6 +11,7 @@ from typing import Any, Literal, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import (
     Array,
     Bools,
@@ -20,6 +21,7 @@ from kerfpath.arrays import (
     html_table,
     in_degrees,
     in_radians,
+    require_instance,
     require_keywords,
     scalar,
     short_repr,
@@ -27,12 +29,18 @@ from kerfpath.arrays import (
 from kerfpath.dynamics import STANDARD_GRAVITY, ArmDynamics, Load
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
-from kerfpath.limits import JerkLimit, TorqueLimit
+from kerfpath.limits import AccelerationLimit, JerkLimit, TorqueLimit
 from kerfpath.losses import Loss, Reason
 from kerfpath.names import identifiers
 from kerfpath.robots.arm import Arm, Solutions, all_solutions, solutions_within
 from kerfpath.robots.axis_3 import AXIS_3, axis_3_of
-from kerfpath.robots.catalogue import acceleration_ratios, arm_of, entry, limits_of
+from kerfpath.robots.catalogue import (
+    acceleration_ratios,
+    acceleration_table_of,
+    arm_of,
+    entry,
+    limits_of,
+)
 from kerfpath.robots.described import ChainKeywords, described_limits, read_description
 from kerfpath.robots.external_axes import (
     CarriedChain,
@@ -302,6 +310,19 @@ class Robot:
         """Largest accelerations (n,) of the joints, per s^2; None if they are not known."""
         return self.limits.acceleration
 
+    def acceleration_at(self, q: Array) -> Array:
+        """Return the largest accelerations at joints q (..., n) rad, per s^2.
+
+        Their shape is (..., n) where the robot has an acceleration table, else (n,).
+
+        Raises
+        ------
+        InputError
+            As `speed_limits`.
+        """
+        _, bound = self.speed_limits()
+        return AccelerationLimit(bound=bound, table=self.limits.acceleration_table).at(q)
+
     @property
     def endless(self) -> Bools:
         """Which joints (n,) turn without end."""
@@ -396,7 +417,8 @@ class Robot:
     def speed_limits(self) -> tuple[Array, Array]:
         """Return the joint velocities (n,) rad/s and accelerations (n,) rad/s^2.
 
-        Those of a linear external axis are in m/s and m/s^2.
+        Those of a linear external axis are in m/s and m/s^2. Where accelerations depend on the
+        configuration, they are what holds at any; see `acceleration_at`.
 
         Raises
         ------
@@ -600,24 +622,43 @@ class Robot:
         return urdf_of(self)
 
     def with_limits(
-        self, *, couplings: Sequence[Coupling] | None = None, **given: Unpack[LimitKeywords]
+        self,
+        *,
+        couplings: Sequence[Coupling] | None = None,
+        acceleration_table: AccelerationTable | None = None,
+        **given: Unpack[LimitKeywords],
     ) -> Robot:
         """Return this robot with some of its limits replaced (rad, s, N m).
+
+        Accelerations also replace a table of them, and a table those of its joints.
 
         Raises
         ------
         InputError
-            Limits of the wrong shape or sign, or velocities or accelerations in deg.
+            Limits of the wrong shape or sign, velocities or accelerations in deg, or a table for
+            joints that the arm does not have.
         """
         changes: dict[str, Any] = {k: value for k, value in given.items() if value is not None}
         for name in ("velocity", "acceleration"):
             _require_radians(changes.get(name), name)
         if couplings is not None:
             changes["couplings"] = tuple(couplings)
-        limits = replace(self.limits, **changes)
+        source = self.acceleration_source
         if "acceleration" in changes:
-            return replace(self, limits=limits, acceleration_source="given by the user")
-        return replace(self, limits=limits)
+            changes["acceleration_table"], source = None, "given by the user"
+        if acceleration_table is not None:
+            require_instance(
+                acceleration_table, AccelerationTable, "acceleration_table",
+                "make one, or read one with its from_csv",
+            )  # fmt: skip
+            for joint, values in acceleration_table.limits.items():
+                _require_radians(values.ravel(), f"acceleration table of joint {joint}")
+            changes["acceleration_table"] = acceleration_table
+            numbers = ", ".join(str(joint) for joint in acceleration_table.limits)
+            source = f"joints {numbers}: table by configuration, {acceleration_table.source}" + (
+                f"; others: {source}" if source else ""
+            )
+        return replace(self, limits=replace(self.limits, **changes), acceleration_source=source)
 
     def with_acceleration_ratio(self, ratio: str) -> Robot:
         """Return this robot with accelerations of a named ratio times the speeds."""
@@ -810,7 +851,12 @@ class Robot:
         return replace(self.alone(), arm=arm, dynamics=dynamics)
 
 
-def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
+def robot(
+    name: str,
+    *,
+    acceleration_ratio: str | None = None,
+    acceleration_table: AccelerationTable | Literal["library"] | None = None,
+) -> Robot:
     """Return a robot of the library by its id.
 
     Parameters
@@ -819,12 +865,15 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
         One of `robot_ids()`.
     acceleration_ratio : str, optional
         Take the accelerations as this ratio (one of `acceleration_ratios()`) times the speeds.
+    acceleration_table : AccelerationTable or "library", optional
+        Accelerations of some joints by configuration, or those that the library has.
 
     Raises
     ------
     InputError
         The robot or the ratio is unknown (the message names the nearest robots), the ratio is for
-        another number of joints, or the robot's velocities are not known.
+        another number of joints, the robot's velocities are not known, or the table is not in the
+        library or not for the joints of the arm.
     """
     data = entry(name)
     found = Robot(
@@ -843,8 +892,17 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
         frames=dict(data["frames"]),
         sources=dict(data["source"]),
     )
-    if acceleration_ratio is None:
+    if acceleration_ratio is not None:
+        found = _with_ratio(found, acceleration_ratio)
+    if acceleration_table == "library":
+        acceleration_table = acceleration_table_of(name)
+    if acceleration_table is None:
         return found
+    return found.with_limits(acceleration_table=acceleration_table)
+
+
+def _with_ratio(found: Robot, acceleration_ratio: str) -> Robot:
+    """Return a robot of the library with accelerations of a ratio; errors as `robot`."""
     ratios = acceleration_ratios()
     if acceleration_ratio not in ratios:
         raise InputError(
@@ -852,13 +910,13 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
         )
     if (n := len(ratios[acceleration_ratio])) != found.joints:
         raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is for {n} joints, but robot {name!r} has "
-            f"{found.joints}; give its accelerations with robot.with_limits(acceleration=...)"
+            f"acceleration_ratio: {acceleration_ratio!r} is for {n} joints, but robot {found.id!r} "
+            f"has {found.joints}; give its accelerations with robot.with_limits(acceleration=...)"
         )
     if found.velocity is None:
         raise InputError(
-            f"robot {name!r}: its joint velocities are not known, so acceleration_ratio cannot be "
-            "applied"
+            f"robot {found.id!r}: its joint velocities are not known, so acceleration_ratio cannot "
+            "be applied"
         )
     return found.with_acceleration_ratio(acceleration_ratio)
 

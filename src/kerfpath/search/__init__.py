@@ -19,6 +19,7 @@ from kerfpath.search.problem import Method as Method
 from kerfpath.search.problem import Metric as Metric
 from kerfpath.search.problem import ObjectiveKind as ObjectiveKind
 from kerfpath.search.problem import SearchProblem as SearchProblem
+from kerfpath.search.problem import change_table as change_table
 from kerfpath.search.problem import rotation_limits as rotation_limits
 from kerfpath.search.relaxations import Relaxations as Relaxations
 from kerfpath.search.relaxations import find_relaxations as find_relaxations

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.change_table import change_factors
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess
 from kerfpath.kernels.metric import increments, increments_between
 from kerfpath.kernels.search import Aim, SortedLayers
@@ -156,7 +157,8 @@ def _increments(layers: SortedLayers, path: Ints) -> Array:
 
 def _passes_seam(layers: SortedLayers, aim: Aim, path: Ints) -> bool:
     dq = _increments(layers, path)
-    if acceleration_excess(dq[0], dq[-1], aim.acceleration) >= 0:
+    here = layers.given[:, path[-1]]
+    if acceleration_excess(dq[0], dq[-1], aim.acceleration * change_factors(aim.table, here)) >= 0:
         return False
     return not exceeds_torque(aim.torque, layers.given, int(path[-1]), dq[-1], dq[0])
 

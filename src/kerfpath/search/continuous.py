@@ -257,9 +257,9 @@ class ContinuousSearch:
             np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size),
             np.zeros(K, np.int64),
         )  # fmt: skip
-        acceleration = self._problem.aim.acceleration
+        change, table = self._problem.aim.acceleration, self._problem.aim.table
         alike = Alike(*wide.alike)
-        if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
+        if advance(targets, way.steps, way.cost, way.V, change, table, first, alike, beam) < K:
             return None
         cost = beam.cost[-1, : beam.size[-1]]
         ends = np.flatnonzero(cost <= cost.min() + SAME_COST * abs(cost.min()))

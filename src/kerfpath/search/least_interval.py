@@ -10,14 +10,17 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.errors import InputError
+from kerfpath.kernels.change_table import ChangeTable
 from kerfpath.kernels.metric import CHEBYCHEV, increments, increments_between
 from kerfpath.kernels.search import Aim
+from kerfpath.limits import AccelerationLimit
 from kerfpath.search.exact import (
     quickest_path,
 )
 from kerfpath.search.problem import (
     Layers,
     SearchProblem,
+    change_table,
     refuse_ends,
     refuse_torque,
     require_joined,
@@ -86,21 +89,23 @@ def find_least_interval(problem: SearchProblem) -> LeastInterval:
         )
     layers = problem.layers
     require_joined(layers)
-    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
-    aim, ceiling = aim_at_least_time(1 / v, a), first_guess(layers, v)
+    v, limit = problem.limits.velocity.usable, problem.limits.acceleration
+    aim = aim_at_least_time(1 / v, limit.usable, change_table(problem.limits))
+    ceiling = first_guess(layers, v)
     while True:
         # Edges that take longer than the ceiling are left out, which is exact if a path keeps it.
         found = quickest(layers, aim, ceiling * v, ceiling)
         if found is not None:
-            return binding(layers, found[0], v, a)
+            return binding(layers, found[0], v, limit)
         ceiling *= 2
 
 
-def aim_at_least_time(weight: Array, acceleration: Array) -> Aim:
+def aim_at_least_time(weight: Array, acceleration: Array, table: ChangeTable) -> Aim:
     """Return the aim to minimise the time, s, that the slowest step or change of a path needs.
 
     A step needs its Chebychev distance under `weight` (n,) s/rad, a change of increments the time
-    in which `acceleration` (n,) rad/s^2 allows it. The node interval of the aim is one second.
+    in which `acceleration` (n,) rad/s^2, times the factor of the table, allows it. The node
+    interval of the aim is one second.
     """
     return Aim(
         weight=freeze(weight),
@@ -108,6 +113,7 @@ def aim_at_least_time(weight: Array, acceleration: Array) -> Aim:
         minimax=True,
         velocity=np.full(len(weight), np.inf),
         acceleration=acceleration,
+        table=table,
         timed=True,
     )
 
@@ -126,7 +132,8 @@ def times_asked(path: Array, endless: Bools, velocity: Array, acceleration: Arra
     """Return the node intervals in which (5) and (6) would hold on a path (K, n) rad.
 
     They are those of its steps, (K-1, n), and of the changes of its steps, (K-2, n). They are in s
-    with limits (n,) in rad/s and rad/s^2, and in node intervals with limits in rad.
+    with limits (n,), the second also (K-2, n), in rad/s and rad/s^2, and in node intervals with
+    limits in rad.
     """
     dq = increments(path, endless)
     return [np.abs(dq) / velocity, np.sqrt(np.abs(np.diff(dq, axis=0)) / acceleration)]
@@ -149,14 +156,14 @@ def sampled_steps(layers: Layers, count: int) -> Iterator[Iterator[Array]]:
         yield (np.abs(increments_between(vertex, here, layers.endless)) for vertex in some)
 
 
-def binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:
+def binding(layers: Layers, index: Ints, v: Array, limit: AccelerationLimit) -> LeastInterval:
     """Return the least interval of a path, and the limit that requires it."""
     path = layers.q[layers.start[:-1] + index]
-    fast, sharp = times_asked(path, layers.endless, v, a)
-    limit: Literal["velocity", "acceleration"]
-    limit = "acceleration" if sharp.max(initial=0.0) > fast.max() else "velocity"
-    time = sharp if limit == "acceleration" else fast
+    fast, sharp = times_asked(path, layers.endless, v, limit.usable_at(path[1:-1]))
+    what: Literal["velocity", "acceleration"]
+    what = "acceleration" if sharp.max(initial=0.0) > fast.max() else "velocity"
+    time = sharp if what == "acceleration" else fast
     k, joint = np.unravel_index(np.argmax(time), time.shape)
     return LeastInterval(
-        dt=float(time.max()), index=freeze(index), joint=int(joint), node=int(k) + 1, limit=limit
+        dt=float(time.max()), index=freeze(index), joint=int(joint), node=int(k) + 1, limit=what
     )

@@ -27,6 +27,7 @@ from kerfpath.arrays import (
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels import search as kernel
+from kerfpath.kernels.change_table import NO_TABLE, ChangeTable
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN, increments, increments_between, wrap
 from kerfpath.kernels.search import Aim, SortedLayers
@@ -554,10 +555,21 @@ class SearchProblem:
             minimax=self.objective == "max",
             velocity=freeze(np.minimum(self.limits.velocity.per_interval(self.dt), self.most)),
             acceleration=self.limits.acceleration.per_interval(self.dt),
+            table=change_table(self.limits),
             torque=NO_TORQUE
             if torque is None
             else TorqueTest(arm=torque.dynamics.bodies, bound=torque.bound, dt=self.dt),
         )
+
+
+def change_table(limits: Limits) -> ChangeTable:
+    """Return the factors by which accelerations may be above their bound, for the kernels."""
+    table = limits.acceleration.table
+    if table is None:
+        return NO_TABLE
+    factor = np.ones((len(table.joint_2), len(table.joint_3), len(limits.acceleration.bound)))
+    factor[..., table.joints] = table.values / table.least
+    return ChangeTable(table.joint_2, table.joint_3, freeze(factor))
 
 
 def offsets(start: ArrayLike, vertices: int) -> Ints:

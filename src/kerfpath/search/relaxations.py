@@ -14,9 +14,7 @@ from kerfpath.search.least_interval import (
     find_least_interval,
     quickest,
 )
-from kerfpath.search.problem import (
-    SearchProblem,
-)
+from kerfpath.search.problem import SearchProblem, change_table
 from kerfpath.search.shortest import find_shortest
 
 LARGEST_ETA_V = 2.0
@@ -69,7 +67,9 @@ def find_relaxations(problem: SearchProblem) -> Relaxations:
     slower = find_least_interval(problem)
     # Velocity limits unchanged; of all paths the one whose sharpest change needs the least time.
     velocity, limits = problem.aim.velocity, problem.limits
-    changes = aim_at_least_time(np.zeros(len(velocity)), limits.acceleration.bound)
+    changes = aim_at_least_time(
+        np.zeros(len(velocity)), limits.acceleration.bound, change_table(limits)
+    )
     sharpest = quickest(problem.layers, changes, velocity, np.inf)
     return Relaxations(
         eta_v=_least_eta_v(problem),

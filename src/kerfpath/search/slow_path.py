@@ -73,7 +73,7 @@ def find_slow_path(problem: SearchProblem) -> LeastInterval:
     """
     require_joined(problem.layers)
     require_steps(problem)
-    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
+    v = problem.limits.velocity.usable
     quickest, dt = None, first_guess(problem.layers, v)
     while quickest is None:
         try:
@@ -82,7 +82,7 @@ def find_slow_path(problem: SearchProblem) -> LeastInterval:
             dt *= 2
     least = quickest.cost * (1 + ROUNDING) or dt
     path: LayeredPath = find_shortest(_first_order(problem, least))
-    return binding(problem.layers, path.index, v, a)
+    return binding(problem.layers, path.index, v, problem.limits.acceleration)
 
 
 def edges_allowed(problem: SearchProblem, dt: float) -> float:

@@ -10,6 +10,7 @@ from kerfpath.arrays import Array, Ints, freeze, scalar, short_repr
 from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
 from kerfpath.kernels import exact
+from kerfpath.kernels.change_table import change_factors
 from kerfpath.kernels.cost_to_go import cost_to_go
 from kerfpath.kernels.search import Aim, LostTime, SortedLayers
 from kerfpath.kernels.states import EVERY
@@ -95,9 +96,9 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     require_steps(problem)
     index, least = _least(layers, aim, penalty, problem.most)
     path = layers.q[layers.start[:-1] + index]
+    change = aim.acceleration * change_factors(aim.table, path[1:-1])
     time, sharp = (
-        asked.max(axis=1)
-        for asked in times_asked(path, layers.endless, aim.velocity, aim.acceleration)
+        asked.max(axis=1) for asked in times_asked(path, layers.endless, aim.velocity, change)
     )
     time[1:] = np.maximum(time[1:], sharp)
     lost = np.maximum(time - 1.0, 0.0)

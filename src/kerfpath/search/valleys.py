@@ -15,6 +15,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.kernels.beam import Alike, Beam, advance
+from kerfpath.kernels.change_table import NO_TABLE
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.metric import increments, increments_between, wrap
 from kerfpath.search.continuous import are_bottoms, targets_of, values_to
@@ -194,7 +195,7 @@ def _course(v: int, direction: _Direction, steps: Steps) -> _Points | None:
         np.zeros(K, np.int64),
     )  # fmt: skip
     change = freeze(np.full(targets.q.shape[1], ANY_CHANGE))
-    if advance(part, steps, cost, values, change, here, Alike(1.0, 1.0), beam) < K:
+    if advance(part, steps, cost, values, change, NO_TABLE, here, Alike(1.0, 1.0), beam) < K:
         return None
     at = beam.at[1:, 0]
     one, other = (np.append(here, ends[at]) for ends in (targets.one, targets.other))

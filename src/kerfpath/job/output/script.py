@@ -222,6 +222,7 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
     """Return what a job asks for that a script cannot express; empty if there is none."""
+    table = job.source["robot"].get("acceleration_table")
     assumed = not keeps_between_nodes(job) or bool(job.program.rules.controller.assumed)
     beyond = {
         'between_nodes = "guaranteed" without a proof': assumed
@@ -234,6 +235,9 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         "refine with parts": job.options.refine_parts > 1,
         "handshakes": bool(job.program.handshakes),
         "compensate": job.compensation is not None,
+        "acceleration_table from a file": table not in (None, "library"),
+        "acceleration_table beside other accelerations": table is not None
+        and {"acceleration_deg_s2", "acceleration_ratio"} & {*job.source["robot"]},
     }
     found = ", ".join(name for name, asked in beyond.items() if asked)
     return f"a script cannot express {found}" if found else ""
@@ -241,7 +245,8 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
 
 def _robot(job: Job) -> str:
     model = job.source["robot"]["model"]
-    plain, own = robot_of(model), job.robot.alone()
+    table = job.source["robot"].get("acceleration_table")
+    plain, own = robot_of(model, acceleration_table=table), job.robot.alone()
     limits, before = own.joint_limits(), plain.joint_limits()
     known = {"velocity": plain.velocity, "acceleration": plain.acceleration}
     changed: dict[str, object] = {}
@@ -257,7 +262,8 @@ def _robot(job: Job) -> str:
             continue
         if old is None or not np.array_equal(np.asarray(new), np.asarray(old)):
             changed[name] = np.asarray(new)
-    text = f"arm = robot({model!r})"
+    asked = "" if table is None else f", acceleration_table={table!r}"
+    text = f"arm = robot({model!r}{asked})"
     return _call(f"{text}.with_limits", changed) if changed else text
 
 

@@ -140,6 +140,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         ("Limits used", f"{options.eta_v:.0%} velocity, {options.eta_a:.0%} acceleration"),
         ("Joint velocity limits", f"{_row(velocity)} deg/s"),
         ("Joint acceleration limits", f"{_row(acceleration)} deg/s²"),  # the footer says whence
+        *_by_configuration(robot),
         *_more_limits(robot),
         ("Endless axes", _row(np.flatnonzero(robot.endless[:n]) + 1) or "none"),
         *_external_facts(robot),
@@ -246,6 +247,14 @@ def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
         allowed=allowed_off(job),
         facts=tuple(facts),
     )
+
+
+def _by_configuration(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Yield what accelerations there are where they depend on the configuration."""
+    table = robot.limits.acceleration_table
+    for joint, values in {} if table is None else table.limits.items():
+        least, most = (f"{np.degrees(value):.0f}" for value in (values.min(), values.max()))
+        yield f"Acceleration limit of joint {joint}", f"{least} to {most} deg/s² by joints 2 and 3"
 
 
 def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:

@@ -388,9 +388,9 @@ def _check_limits(program: Program, settings: RosSettings) -> Iterator[ProgramIs
         return
     found = rates(motion.time, motion.q, motion.stops)
     words: tuple[tuple[Level, str], ...] = (("error", "velocity"), ("warning", "acceleration"))
-    for values, limit, (level, what) in zip(
-        found, program.robot.speed_limits(), words, strict=True
-    ):
+    robot = program.robot
+    limits = (robot.velocity_limits(), robot.acceleration_at(motion.q))
+    for values, limit, (level, what) in zip(found, limits, words, strict=True):
         share = np.abs(values) / limit
         if share.max() > 1 + NOISE:
             k, joint = np.unravel_index(int(share.argmax()), share.shape)

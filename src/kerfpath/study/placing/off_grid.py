@@ -126,7 +126,7 @@ class Beams:
             return np.inf
         v, a = rates_of(increments(path.q, self.endless), np.ones(len(path.q) - 1))
         fast = (np.abs(v) / self.limits.velocity.usable).max(initial=0.0)
-        sharp = (np.abs(a) / self.limits.acceleration.usable).max(initial=0.0)
+        sharp = (np.abs(a) / self.limits.acceleration.usable_at(path.q[1:-1])).max(initial=0.0)
         return float(max(fast, np.sqrt(sharp)))
 
     def _path(self, dt: float) -> ContinuousPath | None:

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
+from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.execution import Response, read_response, response, response_from
@@ -45,6 +46,7 @@ from kerfpath.robots import (
     Robot,
     Travel,
     acceleration_ratios,
+    acceleration_table_of,
     described_axes,
     external_axes,
     robot,
@@ -346,6 +348,17 @@ External = Annotated[tuple[ExternalTable, ...], Field(strict=False, max_length=3
 # -----------------------------------------------------------------------------
 # The [robot] table: which robot, and limits that replace the known ones.
 
+LIBRARY = "library"
+"""Value of `acceleration_table` that asks for the table of the library."""
+
+
+def table_or_library(value: str, info: ValidationInfo) -> str:
+    """Require a file, unless the table of the library is asked for."""
+    if value == LIBRARY:
+        return value
+    return existing("library, or the file of a table of accelerations")(value, info)
+
+
 CONTROLLER = ("manufacturer", "axis_3", "axis_3_deg")
 SOURCES = {
     "model": (),
@@ -515,6 +528,14 @@ class RobotTable(Table):
     acceleration_ratio: Annotated[
         Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
     ] = None
+    acceleration_table: Annotated[
+        Text | None,
+        AfterValidator(table_or_library),
+        key(
+            '"library", or the path of a CSV file of accelerations over joints 2 and 3',
+            '"library"',
+        ),
+    ] = None
     elbow_step_deg: Annotated[
         Positive | None, key("a number above 0, the step of joint 3 of seven, in deg", "10")
     ] = None
@@ -578,6 +599,7 @@ class RobotTable(Table):
                 remedy += f', or, to assume a typical ratio, acceleration_ratio = "{ratio}"'
             expected = f"joint accelerations, as {holder}"
             raise fault(expected, "none", remedy, ("acceleration_deg_s2",))
+        self._require_table(known, folder)
         try:
             self._arm(folder)  # given limits may contradict known ones
         except InputError as error:
@@ -598,6 +620,22 @@ class RobotTable(Table):
             said = f"{error}".removeprefix("response: ")
             raise fault_in_words(said, ("response",)) from None
         return self
+
+    def _require_table(self, known: Robot, folder: Path) -> None:
+        """Require that the table of accelerations can be read and fits the robot."""
+        if self.acceleration_table is None:
+            return
+        if self.acceleration_table == LIBRARY and self.model is None:
+            raise fault(
+                "a table of the library only for a model of it",
+                "another robot",
+                "give the path of a CSV file",
+                ("acceleration_table",),
+            )
+        try:
+            self._with_table(self._with_accelerations(known), folder)
+        except InputError as error:
+            raise fault_in_words(f"{error}", ("acceleration_table",)) from None
 
     def _require_one_source(self) -> None:
         """Require exactly one way to name the robot, and no key of another way."""
@@ -675,13 +713,27 @@ class RobotTable(Table):
 
     def _arm(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot without its external axes."""
-        changed = self._known(folder, bodies=bodies)
-        changed = changed.with_limits(**self._limits(changed.joints))
-        if self.acceleration_ratio is not None:
-            changed = changed.with_acceleration_ratio(self.acceleration_ratio)
+        changed = self._with_accelerations(self._known(folder, bodies=bodies))
+        changed = self._with_table(changed, folder)
         if self.elbow_step_deg is not None:
             changed = changed.with_elbow_step(float(np.radians(self.elbow_step_deg)))
         return changed
+
+    def _with_accelerations(self, known: Robot) -> Robot:
+        """Return a known robot with the limits of the table, constant ones."""
+        changed = known.with_limits(**self._limits(known.joints))
+        if self.acceleration_ratio is None:
+            return changed
+        return changed.with_acceleration_ratio(self.acceleration_ratio)
+
+    def _with_table(self, robot: Robot, folder: Path) -> Robot:
+        """Return the robot with the accelerations by configuration that are asked for."""
+        name = self.acceleration_table
+        if name is None:
+            return robot
+        if name == LIBRARY:
+            return robot.with_limits(acceleration_table=acceleration_table_of(robot.id))
+        return robot.with_limits(acceleration_table=AccelerationTable.from_csv(folder / name))
 
     def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot of the library, of the given lengths, or of the description."""
