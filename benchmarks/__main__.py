@@ -44,6 +44,7 @@ NAMES = (
     "continuum_bounds",
     "continuum_infeasible",
     "execution",
+    "acceleration_table",
     "external",
     "torque",
     "certificate_audits",
@@ -135,6 +136,10 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
         from benchmarks import execution
 
         return execution.run(quick=quick)
+    if name == "acceleration_table":
+        from benchmarks import acceleration_table
+
+        return acceleration_table.run(quick=quick)
     if name == "torque":
         from benchmarks import torque
 
