@@ -337,17 +337,41 @@ def read_robot(path: Path) -> None:
 # --------------------------------------------------------------------------- jobs, plans, programs
 
 
+PROCESS = """
+[process]
+material = "steel"
+thickness_mm = 2
+chart = "chart.toml"
+[[process.row]]
+material = "steel"
+thickness_mm = 3
+speed_m_min = 2
+"""
+CHART = """
+source = "trials"
+[[row]]
+material = "steel"
+thickness_mm = 2
+speed_m_min = 1.5
+kerf_mm = 0.2
+lead_in_mm = 2
+pierce = [{ time_s = 0.1, power_w = 900 }]
+"""
+
+
 def jobs(folder: Path) -> list[Whole]:
     found = []
-    for number, more in enumerate(("", EVERYTHING)):
+    for number, more in enumerate(("", EVERYTHING, PROCESS)):
         place = folder / str(number)
         place.mkdir()
+        (place / "chart.toml").write_text(CHART)
         corners, faces = _box()
         write_meshes(place, corners * 1000, faces)
         shutil.move(place / "text.stl", place / "clamp.stl")
         path = _job(place, "rapid", more)
         found.append(Whole(path, path))
-    return [*found, Whole(folder / "1" / "clamp.stl", found[1].main)]
+    beside = [(folder / "1" / "clamp.stl", 1), (folder / "2" / "chart.toml", 2)]
+    return [*found, *(Whole(spoilt, found[number].main) for spoilt, number in beside)]
 
 
 def read_a_job(path: Path) -> None:

@@ -9,8 +9,17 @@ import chart_files as made
 from commands import assert_refused, run
 from jobs import DEMO, SMALL
 from kerfpath.errors import InputError
-from kerfpath.job import origins_of, read_chart, read_foreign, read_job
+from kerfpath.job import (
+    origins_of,
+    prepare,
+    python_script,
+    read_chart,
+    read_foreign,
+    read_job,
+    with_loops,
+)
 from kerfpath.job.format import doubts_of, sheet_of
+from kerfpath.study.placing import placed_text
 from spoilt import complaint, spoilt
 
 CHART = """\
@@ -224,6 +233,30 @@ def test_the_stand_off_is_that_of_the_cell_too(job):
     assert "- stand-off 1.2 mm" in read.program.remarks
 
 
+def test_a_job_that_is_written_elsewhere_has_its_rows(job, tmp_path):
+    read = job(PROCESS + "# a remark\n")
+    away = tmp_path / "away"
+    away.mkdir()
+    text = placed_text(read, {}, away, "a copy")
+    assert "# a remark" in text
+    (away / "job.toml").write_text(text)
+    again = read_job(away / "job.toml")
+    assert [c.table for c in again.contours] == [c.table for c in read.contours]
+    assert again.program.remarks == read.program.remarks
+    assert again.program.pierce_time == read.program.pierce_time
+
+
+def test_loops_are_added_to_the_text_as_it_is_written(job):
+    read = job()
+    text = with_loops(read, read.read_part(), ["skin/hole1"])
+    assert "speed_m_min" not in text
+    assert text.count("[[contour]]") == 3
+
+
+def test_a_script_has_the_sheet(job):
+    assert "- PROCESS SHEET, set by hand:" in python_script(prepare(job()))
+
+
 # -----------------------------------------------------------------------------
 # The choice of the row.
 
@@ -353,6 +386,21 @@ def test_a_fault_of_a_chart_is_one_line_with_its_place(tmp_path, old, new, line,
     path.write_text(CHART.replace(old, new, 1))
     place = f"{path}:" if line is None else f"{path}:{line}: "
     refused(lambda: read_chart(path), place, *words)
+
+
+def test_a_name_that_no_file_can_have_is_refused(job):
+    refused(lambda: job(PROCESS + f'chart = "{"x" * 5000}"\n'), "process.material", "a chart")
+    assert_refused(run("charts", "show", "x" * 5000), "a chart")
+    assert_refused(run("charts", "check", "x" * 5000), "cannot be read")
+
+
+def test_a_broken_chart_is_listed_with_its_fault(job, tmp_path):
+    job()
+    (tmp_path / "charts" / "broken.toml").write_text("row = 1\n")
+    listed = run("charts", "list", cwd=tmp_path)
+    assert listed.returncode == 0
+    assert "charts/broken.toml" in listed.stdout
+    assert "expected" in listed.stdout
 
 
 def test_unusual_values_are_doubted(tmp_path):

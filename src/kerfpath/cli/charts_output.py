@@ -28,9 +28,15 @@ COLUMNS = ["row", "material", "mm", "gas", "quality", "technique", "m/min", "ker
 
 def list_charts() -> None:
     """Print every chart in the current folder, of the user, and shipped."""
-    entries, rows = [], []
+    entries: list[dict[str, object]] = []
+    rows = []
     for place, name, path in chart_files(Path()):
-        chart = read_chart(path, name)
+        try:
+            chart = read_chart(path, name)
+        except InputError as error:
+            entries.append({"name": name, "place": place, "file": str(path), "fault": str(error)})
+            rows.append([name, "-", "", str(error)])
+            continue
         materials = sorted({row.material for row in chart.table.row})
         entries.append(
             {

@@ -15,6 +15,7 @@ from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
 from kerfpath.job.format.faults import error_at, refusal
 from kerfpath.job.format.tables import (
+    LONGEST_WORD,
     ChartFile,
     JobRowTable,
     ProcessTable,
@@ -73,7 +74,7 @@ def read_chart(path: Path, name: str = "") -> Chart:
     InputError
         The file is not a valid chart; one line for its first fault, and one for each other.
     """
-    if path.suffix.lower() != ".toml" and path.is_file():
+    if path.suffix.lower() != ".toml" and _is_file(path):
         said = f"expected a chart (.toml), got {path.suffix or 'a file without a suffix'}"
         raise error_at(path, None, f"{said}; convert it with kerfpath charts convert {path}")
     text = read_text(path, "a chart")
@@ -117,7 +118,7 @@ def find_chart(name: str, folder: Path | None = None) -> Chart:
         There is no such chart, or it is not valid.
     """
     path = (folder or Path()) / name
-    if path.is_file():
+    if _is_file(path):
         return read_chart(path, name)
     known: dict[str, tuple[str, Path]] = {}
     for place, called, file in chart_files(folder):
@@ -127,7 +128,14 @@ def find_chart(name: str, folder: Path | None = None) -> Chart:
         called, file = known[name]
         return read_chart(file, called)
     names = sorted({called for called, _ in known.values()})
-    raise InputError(f'expected a chart, got "{name}"; {nearest(name, names)}')
+    raise InputError(f'expected a chart, got "{name[:LONGEST_WORD]}"; {nearest(name, names)}')
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that the file system cannot hold
+        return False
 
 
 # -----------------------------------------------------------------------------
@@ -186,25 +194,30 @@ def choose(process: ProcessTable, technique: str, folder: Path) -> JobRowTable:
         No row fits, or several do.
     """
     wanted = process.model_copy(update={"technique": technique})
-    groups = [process.row]
-    if process.chart is not None:
-        groups.append(find_chart(process.chart, folder).rows)
-    else:
-        for place in ("job", "user"):
-            found = [(c, p) for at, c, p in chart_files(folder) if at == place]
-            groups.append(tuple(r for called, p in found for r in read_chart(p, called).rows))
-    every = [row for rows in groups for row in rows]
+    every: list[JobRowTable] = []
+    for rows in _groups(process, folder):
+        every += rows
+        near = [row for row in _alike(rows, wanted) if _apart(row, wanted) <= NEAR]
+        least = min((_apart(row, wanted) for row in near), default=0.0)
+        if row := _picked([row for row in near if _apart(row, wanted) == least], wanted):
+            return row
     if not every:
         raise InputError(
             f"expected a chart in {folder / FOLDER} or {user_folder()}, got none; name one with "
             "chart (kerfpath charts list shows those that are shipped as examples)"
         )
-    for rows in groups:
-        near = [row for row in _alike(rows, wanted) if _apart(row, wanted) <= NEAR]
-        least = min((_apart(row, wanted) for row in near), default=0.0)
-        if row := _picked([row for row in near if _apart(row, wanted) == least], wanted):
-            return row
     return _between(_fitting(every, wanted), wanted)
+
+
+def _groups(process: ProcessTable, folder: Path) -> Iterator[Sequence[JobRowTable]]:
+    """Yield the rows of each place, the first that counts first; files are read as they come."""
+    yield process.row
+    if process.chart is not None:
+        yield find_chart(process.chart, folder).rows
+        return
+    for place in ("job", "user"):
+        found = [(called, path) for at, called, path in chart_files(folder) if at == place]
+        yield [row for called, path in found for row in read_chart(path, called).rows]
 
 
 def _apart(row: RowTable, wanted: ProcessTable) -> float:

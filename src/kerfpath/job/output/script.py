@@ -369,7 +369,7 @@ def _operations(task: ContourSpec, part: Part) -> Iterator[str]:
     if (smooth := table.smooth_axes) is not None:
         limit = f"np.radians({smooth.limit_deg!r})"
         yield f"smooth_axes(path, {smooth.distance_mm!r} * MM, limit={limit})"
-    if table.kerf_mm is not None:
+    if table.kerf_mm:
         sharp = corners is not None
         yield f"offset(path, {table.kerf_mm!r} * MM / 2, side={scrap!r}, sharp={sharp})"
     if corners is not None and corners.round_mm is not None:
@@ -411,6 +411,8 @@ def _program(job: Job) -> list[str]:
     known = settings_of(ProgramOptions).items()
     named = {name: getattr(options, name) for name, each in known if each.takes is not None}
     del named["language"]
+    if options.remarks:
+        named["remarks"] = options.remarks
     said = {} if options.settings is None else options.settings.model_dump(exclude_defaults=True)
     settings = f"language({options.language!r}).settings({_arguments(said)})"
     made = _call("return build_program", named, "plans").replace("\n", "\n    ")

@@ -238,8 +238,8 @@ def changes_of(job: Job, numbers: Numbers) -> list[tuple[tuple[str | int, ...], 
 def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
     """Return the text of the job file with these numbers, for a file in `folder`.
 
-    Comments are kept, file names are made relative to `folder`, and `remark` becomes the first
-    comment.
+    Comments are kept, file names are made relative to `folder`, rows of charts that are used are
+    written out, and `remark` becomes the first comment.
     """
     file = tomlkit.parse(job.text)
     for where, value in changes_of(job, numbers):
@@ -250,6 +250,9 @@ def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
             del table[where[-1]]
         else:
             table[where[-1]] = value
+    if "process" in file:  # with the rows in use, no chart is needed
+        file["process"]["row"] = job.source["process"]["row"]
+        file["process"].pop("chart", None)
     for table, name in _named_files(file):
         table[name] = os.path.relpath(job.path.parent / str(table[name]), folder)
     return f"# {remark}\n{tomlkit.dumps(file)}"

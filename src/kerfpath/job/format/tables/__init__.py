@@ -22,6 +22,7 @@ from kerfpath.job.format.tables.job import tables_in as tables_in
 from kerfpath.job.format.tables.part import ContourTable as ContourTable
 from kerfpath.job.format.tables.part import MachineTable as MachineTable
 from kerfpath.job.format.tables.plan import PlanTable as PlanTable
+from kerfpath.job.format.tables.process import LONGEST_WORD as LONGEST_WORD
 from kerfpath.job.format.tables.process import ChartFile as ChartFile
 from kerfpath.job.format.tables.process import JobRowTable as JobRowTable
 from kerfpath.job.format.tables.process import ProcessTable as ProcessTable
