@@ -32,6 +32,10 @@ def cells(spread):
         bend=nothing,
         spread=np.c_[spread, nothing[:, 0]],
         floor=np.full(C, -np.inf),
+        at=np.zeros((C, 0)),
+        reach=np.zeros((C, 0)),
+        tied=np.zeros((C, 0, 2)),
+        cuts=np.zeros(C, np.int16),
     )
 
 

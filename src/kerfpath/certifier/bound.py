@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Ints, scalar, short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
-from kerfpath.certifier.cells import CellMaker, CellSet, foldable
+from kerfpath.certifier.cells import CellMaker, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.first_order import FirstOrder
 from kerfpath.certifier.minimax import largest_step_bound
@@ -25,9 +25,10 @@ from kerfpath.certifier.stages import (
     linked,
     solve_stage,
 )
+from kerfpath.certifier.wide import thick, wide_bound
 from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.plans import Plan
+from kerfpath.plans import OF_BOUND, Plan
 from kerfpath.progress import Progress, StopEarly, no_progress
 from kerfpath.search import METRIC_CODES
 
@@ -59,7 +60,7 @@ CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
 """For checkable certificates: a cell of this level drops out if motions through it cost more than
 the plan by this share, four times the share per coarser level, because a checker's own enclosures
 may give less; and the factor on the curvature. Otherwise only `SAME_COST`, for rounding."""
-NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
+NOT_KEPT = f'{OF_BOUND}of the objective "max" has no certificate to keep'
 UNFOLDED = 0.2
 """Share of the work within which cells must have been bounded on every turn of their joints, so
 that turns are distinguished: joints with a range of a turn or more count as endless before."""
@@ -173,14 +174,23 @@ def certify(
     why = _why_not(plan)
     if why:
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
-    steps = _steps_of(plan)
+    steps, more = _steps_of(plan), _more_than_gamma(plan)
+    checkable = checkable and not more
     if plan.settings.objective == "max":
         best, rounds, pairs = largest_step_bound(
             plan, steps, gap, lambda: monotonic() > until, progress
         )
-        found = _certified(plan, best, gap, None, rounds, pairs)
+        found = _certified(plan, best, gap, None, rounds, pairs, more)
         return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
     most = most_pairs(len(plan.q)) if most is None else most
+    if thick(plan, steps):
+
+        def spent(pairs: float) -> bool:
+            """Return whether the time is over, or this number of steps exceeds the limit."""
+            return monotonic() > until if until < np.inf else pairs > most
+
+        best, rounds, pairs = wide_bound(plan, steps, gap, spent, progress)
+        return _certified(plan, best, gap, None, rounds, pairs, more)
     certification = _Certification(plan, steps, gap, until, most, checkable, progress)
     try:
         certification.run()
@@ -189,14 +199,23 @@ def certify(
             raise
     stages = tuple(certification.stages) if checkable else None
     return _certified(
-        plan, certification.best, gap, stages, certification.count, certification.pairs
+        plan, certification.best, gap, stages, certification.count, certification.pairs, more
     )
 
 
 def _certified(
-    plan: Plan, best: float, gap: float, kept: tuple[Stage, ...] | None, stages: int, pairs: int
+    plan: Plan,
+    best: float,
+    gap: float,
+    kept: tuple[Stage, ...] | None,
+    stages: int,
+    pairs: int,
+    more: str = "",
 ) -> Certified:
-    """Return the plan with its proved bound, and with the stages to keep if there are any."""
+    """Return the plan with its proved bound, and with the stages to keep if there are any.
+
+    `more` is what else it holds for, as `_more_than_gamma` says it.
+    """
     bound = max(best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
     certificate = None if kept is None else Certificate(bound=bound, stages=kept)
@@ -204,7 +223,7 @@ def _certified(
     return Certified(
         plan=replace(plan, proof=proof),
         done=reached <= gap,
-        statement=proof.bound_claim,
+        statement=f"{proof.bound_claim}; {more}" if more else proof.bound_claim,
         stages=stages,
         pairs=pairs,
     )
@@ -212,18 +231,29 @@ def _certified(
 
 def _why_not(plan: Plan) -> str:
     """Return the reason why no bound of a plan can be proved; "" if one can."""
-    robot, asked = plan.robot, plan.settings
-    if robot.externals:
-        return "the joints of an external axis are not enclosed"
-    if not robot.encloses:
+    robot = plan.robot
+    if robot.family.enclose_all is None:
         return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"
-    if asked.tilt is not None:
-        return "the tool axis may tilt"
     if plan.feed is not None:
         return "the feed is reduced"
     if not plan.cost > 0:
         return "its cost is not above 0"
     return ""
+
+
+def _more_than_gamma(plan: Plan) -> str:
+    """Return what the bound of a plan holds for besides gamma, and what it leaves out; or ""."""
+    names, what = [axis.name for axis in plan.robot.externals], []
+    if plan.settings.tilt is not None:
+        what.append("any tilt within the cone")
+    if names:
+        what.append(f"any values of {' and '.join(names)}")
+    if not what:
+        return ""
+    left_out = "the acceleration limit"
+    if plan.settings.tilt is not None and plan.settings.tilt.cost:
+        left_out += " and the cost of the tilt"
+    return f"{OF_BOUND}holds for {' and '.join(what)}, leaves out {left_out}, has no certificate"
 
 
 def _steps_of(plan: Plan) -> Steps:
@@ -252,15 +282,14 @@ class _Certification:
         checkable: bool,
         progress: Progress,
     ) -> None:
-        robot, asked = plan.robot, plan.settings
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME_COST, 1.0)
-        task = robot, plan.frames, plan.T_flange_tip, asked.postures, width
-        folded = foldable(robot, steps.velocity)
-        floor = None if checkable else asked.floor
-        self.maker = CellMaker(*task, floor=floor)
+        folded = foldable(plan.robot, steps.velocity)
+        floor = None if checkable else plan.settings.floor
+        self.maker = cell_maker(plan, steps.weight, width, floor=floor)
         self.unfolded: CellMaker | None = None
         if folded.any() and not checkable:
-            self.maker, self.unfolded = CellMaker(*task, folded, floor), self.maker
+            self.unfolded = self.maker
+            self.maker = cell_maker(plan, steps.weight, width, folded, floor)
         self.steps = replace(steps, endless=self.maker.endless)
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
@@ -292,7 +321,7 @@ class _Certification:
             if not self.checkable:
                 result = result.floored()
             gained, cells = self._take(result), result.cells
-            clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
+            clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.grain))
             live = result.through <= self.cost * (1 + clearly)
             if not self.checkable:
                 live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
@@ -301,7 +330,7 @@ class _Certification:
             which, singular = cells_to_divide(
                 cells, result.through, self.goal, self.steps.weight, DEEPEST
             )
-            fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
+            fine = not singular and low.any() and np.median(cells.grain[low]) >= FINE
             slow = bool(fine) and gained < STALLED
             left = float(live.mean() + which.mean())
             ahead = self.pairs + result.pairs * left**2
@@ -330,7 +359,7 @@ class _Certification:
                 self._finish(result)
                 return
             elif fine and (lifted := self._unfold(cells.take(live), result.pairs)) is not None:
-                which = (lifted.floor < self.goal) & (lifted.level < DEEPEST)
+                which = (lifted.floor < self.goal) & (lifted.grain < DEEPEST)
                 cells = self.maker.divided(lifted, which)
             else:
                 cells = self.maker.divided(cells.take(kept), which[kept])
@@ -400,7 +429,7 @@ class _Certification:
     @cached_property
     def _priced(self) -> bool:
         """Whether (6) adds more to the cost of the plan than the gap that may be left."""
-        if self.checkable:
+        if self.checkable or self.maker.more:
             return False
         share = np.abs(self.plan.acceleration_share)
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
@@ -493,7 +522,7 @@ class _Certification:
         """
         level = 0
         if len(cells):
-            level = min(most, int(np.median(cells.level)) - (not self._priced))
+            level = min(most, int(np.median(cells.grain)) - (not self._priced))
         missing = np.setdiff1d(self.nodes, cells.node)
         if not len(missing):
             return cells
@@ -501,7 +530,7 @@ class _Certification:
         while True:
             passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
             unsure = new.uncertain(self.steps.weight, UNCERTAIN * self.cost)
-            coarse = passed & ((new.level < level) | unsure)
+            coarse = passed & ((new.grain < level) | unsure)
             if not coarse.any() or len(new) > MOST_CELLS or self._spent(self.pairs):
                 return CellSet.join([cells, new])
             new = self.maker.divided(new, coarse)

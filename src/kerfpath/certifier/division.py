@@ -90,7 +90,7 @@ def cells_to_divide(
     deepest : int
         Level of the cells that are not divided any more; what is uncertain on them stays so.
     """
-    divisible = cells.level < deepest
+    divisible = cells.grain < deepest
     low = (through < target) & divisible
     if not low.any():
         return low, False

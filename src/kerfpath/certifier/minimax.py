@@ -15,7 +15,7 @@ import numpy as np
 
 from kerfpath.arrays import Array
 from kerfpath.certificate import ALLOWANCE
-from kerfpath.certifier.cells import CellMaker, CellSet, foldable
+from kerfpath.certifier.cells import CellSet, cell_maker, foldable
 from kerfpath.certifier.parts import SAME_COST
 from kerfpath.certifier.stages import Steps, arranged, least_over_layers
 from kerfpath.effort import current_effort
@@ -56,9 +56,8 @@ def largest_step_bound(
     most_pairs = current_effort().minimax_pairs
     steps = _capped(steps, target)
     folded = foldable(plan.robot, steps.velocity)
-    task = plan.robot, plan.frames, plan.T_flange_tip, plan.settings.postures
-    maker = CellMaker(*task, folded=folded)
-    unfolded = CellMaker(*task) if folded.any() else None
+    maker = cell_maker(plan, steps.weight, folded=folded)
+    unfolded = cell_maker(plan, steps.weight) if folded.any() else None
     cells = maker.coarsest(np.arange(len(plan.q)))
     cells = maker.certain(cells, steps.weight, UNCERTAIN * target)
     best, rounds, pairs, more = 0.0, 0, 0, 0.0
@@ -69,7 +68,7 @@ def largest_step_bound(
         best = max(best, min(least_over_layers(cells.node, floor), target))
         progress("certificate", int(1000 * best / target), 1000)
         live = floor < target
-        which = live & (cells.level < DEEPEST)
+        which = live & (cells.grain < DEEPEST)
         if best >= target or not which.any():
             break
         more = tried * (2 * live.mean()) ** 2
@@ -77,7 +76,7 @@ def largest_step_bound(
         if unfolded is not None and best - before < STALLED * (target - before):
             maker, unfolded = unfolded, None
             cells = maker.lifted(cells)
-            which = cells.level < DEEPEST
+            which = cells.grain < DEEPEST
         cells = maker.divided(cells, which)
     return best, rounds, pairs
 

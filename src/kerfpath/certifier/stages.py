@@ -55,6 +55,8 @@ class Steps:
     endless : (n,) bool
     most : float
         Largest cost of a step; infinite for no limit.
+    farthest : float or (n,) rad
+        Largest increment of a joint in a step over any number of intervals.
     """
 
     weight: Array
@@ -63,12 +65,13 @@ class Steps:
     metric: int
     endless: Bools
     most: float = np.inf
+    farthest: float | Array = np.inf
 
     __repr__ = short_repr
 
     def over(self, intervals: int) -> Step:
         """Return the step over several intervals, which costs at most their sum (14)."""
-        velocity = intervals * self.velocity
+        velocity = np.minimum(intervals * self.velocity, self.farthest)
         tilt, most = np.zeros_like(velocity), intervals * self.most
         return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
 
@@ -278,6 +281,7 @@ def solve_stage(
     multipliers: Array | None = None,
     care: float = np.inf,
     most: float | None = None,
+    given: Array | None = None,
 ) -> StageResult:
     """Return the bounds that the cells prove for every motion through them.
 
@@ -292,6 +296,8 @@ def solve_stage(
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     most : float, optional
         If given, pairs of steps that break (6) are excluded for motions that cost at most this.
+    given : (M - 1, J, n), optional
+        Slopes of the potential to try at each layer but the last.
 
     Raises
     ------
@@ -312,7 +318,7 @@ def solve_stage(
         np.zeros(C),
     )
     potential.level[start[-2] :] = 0.0
-    begin, to, cost = _lay(packed, spans, potential, steps, multipliers, care)
+    begin, to, cost = _lay(packed, spans, potential, steps, multipliers, care, given)
     ahead, behind = np.zeros(C), np.full(C, np.inf)
     first = slice(start[0], start[1])
     behind[first] = _least_at_first(cells.take(first), potential, first)
@@ -369,7 +375,7 @@ def arranged(cells: CellSet, steps: Steps) -> Arranged:
     nodes, start = np.unique(cells.node, return_index=True)
     widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
     curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
-    packed = Cells(np.append(start, len(cells)), *curves, key, widest)
+    packed = Cells(np.append(start, len(cells)), *curves, key, widest, cells.tied, cells.reach)
     return Arranged(cells, packed, nodes.astype(np.int64), order)
 
 
@@ -400,6 +406,7 @@ def _lay(
     steps: Steps,
     multipliers: Array | None,
     care: float,
+    given: Array | None = None,
 ) -> tuple[Ints, Ints, Array]:
     """Compute the potential from the last layer to the first; return steps and reduced costs.
 
@@ -408,7 +415,7 @@ def _lay(
     start, C = packed.start, len(packed.half)
     count = np.zeros(C, np.int64)
     layers: list[tuple[Ints, Array]] = []
-    threads = thread_count()
+    threads, none = thread_count(), np.zeros((0, len(steps.weight)))
     with ThreadPoolExecutor(threads) as pool:
         for k in range(len(start) - 3, -1, -1):
             first, last = int(start[k]), int(start[k + 1])
@@ -424,7 +431,18 @@ def _lay(
             ends = [first, *(first + middle).tolist(), last]
             runs = [
                 pool.submit(
-                    lay_potential, packed, potential, step, k, a, b, care, shifted, to, cost
+                    lay_potential,
+                    packed,
+                    potential,
+                    step,
+                    k,
+                    a,
+                    b,
+                    care,
+                    none if given is None else given[k],
+                    shifted,
+                    to,
+                    cost,
                 )
                 for a, b in pairwise(ends)
             ]
@@ -450,6 +468,10 @@ def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array
         slope = np.abs((y * cells.slope).sum(axis=1))
         bend = np.maximum((y * cells.bend).sum(axis=1), 0.0)
         less = slope * h + bend * h**2 / 2 + (np.abs(y) * cells.spread).sum(axis=1)
+        if cells.reach.shape[1]:
+            tied = np.einsum("cmi,ci->cm", cells.tied, y)
+            size = np.einsum("cmi,ci->cm", np.abs(cells.tied), np.abs(y))
+            less += ((np.abs(tied) + ROUNDED * size) * cells.reach).sum(axis=1)
         best = np.maximum(best, potential.level[first, m] - less * (1 + ROUNDED))
     return np.asarray(best)
 
@@ -498,7 +520,9 @@ def _codes(cells: CellSet, maker: CellMaker) -> tuple[Ints, Ints]:
     wrist can be flipped, the numbers of the cells with the wrist flipped follow, (2 C,) each.
     """
     sets = [cells] if maker.flip is None else [cells, cells.flipped(*maker.flip)]
-    name = np.concatenate([np.stack([c.node, c.posture, c.level, c.index], axis=1) for c in sets])
+    name = np.concatenate(
+        [np.column_stack([c.node, c.posture, c.level, c.index, c.at, c.reach]) for c in sets]
+    )
     center = np.concatenate([c.center for c in sets])
     _, first, which = np.unique(name, axis=0, return_index=True, return_inverse=True)
     which = which.ravel()
@@ -539,6 +563,10 @@ def compile_bound() -> None:
         bend=none,
         spread=none,
         floor=np.full(nodes, -np.inf),
+        at=np.zeros((nodes, 0)),
+        reach=np.zeros((nodes, 0)),
+        tied=np.zeros((nodes, 0, joints)),
+        cuts=np.zeros(nodes, np.int16),
     )
     ones = freeze(np.ones(joints))
     steps = Steps(

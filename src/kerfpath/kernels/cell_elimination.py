@@ -64,6 +64,8 @@ def _wide(cells: Cells, a: int, i: int, r: int, f: float) -> float:
     slope = abs(cells.slope[a, i] - f * cells.slope[a, r])
     bend = abs(cells.bend[a, i] - f * cells.bend[a, r])
     wide: float = slope * h + bend * h * h / 2.0 + cells.spread[a, i] + abs(f) * cells.spread[a, r]
+    for m in range(cells.reach.shape[1]):
+        wide += abs(cells.tied[a, m, i] - f * cells.tied[a, m, r]) * cells.reach[a, m]
     return wide
 
 

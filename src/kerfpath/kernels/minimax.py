@@ -48,6 +48,8 @@ def _unsure(cells: Cells, a: int, i: int) -> float:
     """Return how far joint i may be from a straight line over cell a."""
     h = cells.half[a]
     wide: float = abs(cells.bend[a, i]) * h * h / 2.0 + cells.spread[a, i]
+    for m in range(cells.reach.shape[1]):
+        wide += abs(cells.tied[a, m, i]) * cells.reach[a, m]
     return wide
 
 

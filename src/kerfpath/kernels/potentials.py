@@ -25,7 +25,7 @@ from kerfpath.kernels.reduced import (
     tangent,
     window,
 )
-from kerfpath.kernels.slopes import flatten, guess_slopes
+from kerfpath.kernels.slopes import Spare, flatten, guess_slopes
 
 __all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells", "reach_cells"]
 
@@ -207,6 +207,55 @@ def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: B
                 out_after[a] = out_before[b] = True
 
 
+@jit_inline
+def _lay_given(
+    cells: Cells, potential: Potential, step: Step, a: int, ahead: Ints, way: Ints, D: Array,
+    given: Array, flat: float, care: float, here: Array, floor: Array, spare: Spare, y: Array,
+    other: Array, proved: Array, out_cost: Array,
+) -> None:  # fmt: skip
+    """Lay both cuts of cell a by the best of the given slopes, of a guess, and of none at all.
+
+    ``proved`` (3, E) is scratch.
+    """
+    n, J, count = len(y), len(given), len(ahead)
+    one, two, free = 0, 1, 2
+    kept, sure = -np.inf, -np.inf
+    potential.level[a, 0] = potential.level[a, 1] = -np.inf
+    best = guess_slopes(cells, potential, step, a, 0.0, ahead, D, here, floor, spare, y)
+    for j in range(J + 2):
+        for i in range(n):
+            if j > J:
+                y[i] = 0.0
+            elif j > 0:
+                y[i] = given[j - 1, i]
+        if j > J and max(kept, sure) >= flat:
+            break
+        flatten(cells, a, y)
+        level = _level(cells, potential, step, a, ahead, way, D, y, care, best, other, proved[free])
+        for i in range(n):
+            other[i] = 0.0
+        least = level + lean(cells, a, other, y)
+        if level > potential.level[a, 0]:
+            if kept > sure:
+                for i in range(n):
+                    potential.dual[a, 1, i] = potential.dual[a, 0, i]
+                potential.level[a, 1], sure = potential.level[a, 0], kept
+                two, one = one, two
+            for i in range(n):
+                potential.dual[a, 0, i] = y[i]
+            potential.level[a, 0], kept = level, least
+            one, free = free, one
+        elif least > sure:
+            for i in range(n):
+                potential.dual[a, 1, i] = y[i]
+            potential.level[a, 1], sure = level, least
+            two, free = free, two
+    for p in range(count):
+        to_first = proved[one, p] - potential.level[a, 0]
+        out_cost[p] = min(to_first, proved[two, p] - potential.level[a, 1])
+    close_cut(cells, potential, a, other)
+
+
 @jit
 def lay_potential(
     cells: Cells,
@@ -216,6 +265,7 @@ def lay_potential(
     first: int,
     last: int,
     care: float,
+    given: Array,
     begin: Ints,
     out_to: Ints,
     out_cost: Array,
@@ -224,13 +274,19 @@ def lay_potential(
 
     The steps of cell a are begin[a]..begin[a+1]-1; out_to has the cell that each leads to. Steps
     that cost more than `care` beyond the cheapest may get a smaller bound than could be proved.
+    ``given`` (J, n) are slopes to try besides those that are guessed; without any there are guesses
+    from both ends of each cell.
     """
     n, most = len(step.velocity), 0
     for a in range(first, last):
         most = max(most, begin[a + 1] - begin[a])
-    D, way, proved = np.empty((most, n)), np.empty(most, np.int64), np.empty((2, most))
+    D, way, proved = np.empty((most, n)), np.empty(most, np.int64), np.empty((3, most))
     floor, here, y, other = np.empty(most), np.empty(n), np.empty(n), np.empty(n)
-    run = np.empty(2, np.int64)
+    run, P = np.empty(2, np.int64), 1 + cells.reach.shape[1]
+    spare = Spare(
+        np.empty((P, n)), np.empty((P, 2)), np.empty(P), np.empty(P), np.empty(2),
+        np.empty(3 * n + 3),
+    )  # fmt: skip
     for a in range(first, last):
         count = begin[a + 1] - begin[a]
         potential.level[a, 0] = potential.level[a, 1] = np.inf
@@ -248,9 +304,15 @@ def lay_potential(
                     if p == count:
                         break
         flat = _flat_level(potential, step, ahead, other)
+        if len(given) > 0:
+            _lay_given(
+                cells, potential, step, a, ahead, way, D, given, flat, care, here, floor, spare,
+                y, other, proved, out_cost[begin[a] : begin[a + 1]],
+            )  # fmt: skip
+            continue
         for m in range(2):
             t = (2 * m - 1) * cells.half[a]
-            best = guess_slopes(cells, potential, step, a, t, ahead, D, here, floor, y)
+            best = guess_slopes(cells, potential, step, a, t, ahead, D, here, floor, spare, y)
             if m == 1:
                 flatten(cells, a, y)
             level = -np.inf

@@ -1,8 +1,9 @@
 """Reduced costs: the least that a step from cell to cell costs, measured by a potential.
 
-Over a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r, |t| <= h (`kernels.enclosure`). A
-potential V has two cuts per cell, V(q) = max_m level_m - y_m . (q - c). For a step u = q' - q with
-|u| <= v, and any vector y,
+Over a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r, |t| <= h (`kernels.enclosure`); where
+poses leave more than gamma free, plus slopes times further parameters. A potential V has two cuts
+per cell, V(q) = max_m level_m - y_m . (q - c). For a step u = q' - q with |u| <= v, and any vector
+y,
 
     rho(u) + mu . u >= y . u - P(y),    P(y) the most by which y . u can exceed it,
 
@@ -30,6 +31,7 @@ __all__ = [
     "Potential",
     "Step",
     "beyond",
+    "drift",
     "lean",
     "least_ahead",
     "near",
@@ -48,6 +50,8 @@ class Cells(NamedTuple):
     ``start`` is (K+1,). ``center``, ``slope``, ``bend`` (middle of the curvature), ``spread``
     (uncertainty of the joint, rad) and ``box`` (how far a joint may be from its centre) are (C, n).
     ``half`` is (C,) rad; ``widest`` (K,) is the largest box of the joint ``key`` in each layer.
+    ``tied`` (C, M, n) are the slopes of the joints by M further parameters, whose sizes are at most
+    ``reach`` (C, M).
     """
 
     start: Ints
@@ -59,6 +63,8 @@ class Cells(NamedTuple):
     half: Array
     key: int
     widest: Array
+    tied: Array
+    reach: Array
 
 
 class Potential(NamedTuple):
@@ -175,6 +181,20 @@ def beyond(y: Array, step: Step) -> float:
 
 
 @jit_inline
+def drift(cells: Cells, a: int, y: Array, z: Array) -> float:
+    """Return the most by which the further parameters of cell a move (z - y) . q, rounded up."""
+    most = 0.0
+    for m in range(cells.reach.shape[1]):
+        slope, size = 0.0, 0.0
+        for i in range(len(y)):
+            x = (z[i] - y[i]) * cells.tied[a, m, i]
+            slope += x
+            size += abs(x)
+        most += (abs(slope) + SLACK * size) * cells.reach[a, m]
+    return most * (1.0 + SLACK)
+
+
+@jit_inline
 def lean(cells: Cells, a: int, y: Array, z: Array) -> float:
     """Return a lower bound of (z - y) . (q - c) over cell a."""
     slope, bend, spread = 0.0, 0.0, 0.0
@@ -183,6 +203,7 @@ def lean(cells: Cells, a: int, y: Array, z: Array) -> float:
         slope += d * cells.slope[a, i]
         bend += d * cells.bend[a, i]
         spread += abs(d) * cells.spread[a, i]
+    spread += drift(cells, a, y, z)
     h = cells.half[a]
     slope = abs(slope)
     if bend > 0 and slope < bend * h:
@@ -201,6 +222,8 @@ def least_ahead(cells: Cells, potential: Potential, b: int, y: Array) -> float:
         bend += y[i] * cells.bend[b, i]
         off0 += abs(y[i] - potential.dual[b, 0, i]) * cells.spread[b, i]
         off1 += abs(y[i] - potential.dual[b, 1, i]) * cells.spread[b, i]
+    off0 += drift(cells, b, y, potential.dual[b, 0])
+    off1 += drift(cells, b, y, potential.dual[b, 1])
     h = cells.half[b]
     slope0, slope1 = slope - potential.along[b, 0], slope - potential.along[b, 1]
     level0, level1 = potential.level[b, 0] - off0, potential.level[b, 1] - off1

@@ -5,6 +5,8 @@ A guess may be wrong; `kernels.potentials` then proves what it is worth.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
@@ -12,7 +14,7 @@ from kerfpath.kernels.jit import jit_inline
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, extend, finish
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
 
-__all__ = ["flatten", "guess_slopes"]
+__all__ = ["Spare", "flatten", "guess_slopes"]
 
 PENALTY = 10.0
 """Price of an increment beyond (5), in weights: it leads a guess back within (5)."""
@@ -23,9 +25,26 @@ TIED = 2e-5
 the largest of all and still count as tied with it: what the search along the cell leaves."""
 HALVINGS = 30
 """Steps of the search along a cell for metrics that are not Manhattan."""
+ROUNDS = 3
+"""How often each parameter of a cell takes its turn where there are more than gamma."""
 UNSURE = 0.03
 """rad: a joint that is less certain than this on a cell gets no slope. The slope would lose more
 than it gains wherever the cells that lead there do not have the same slope."""
+
+
+class Spare(NamedTuple):
+    """Room for the search in P parameters of a cell: their slopes of n joints, and of both cuts.
+
+    ``steep`` is (P, n), ``along`` (P, 2), ``place`` and ``half`` (P,), ``level`` (2,) and ``kinks``
+    (3 n + 3,).
+    """
+
+    steep: Array
+    along: Array
+    place: Array
+    half: Array
+    level: Array
+    kinks: Array
 
 
 @jit_inline
@@ -160,6 +179,127 @@ def _balance(
 
 
 @jit_inline
+def _price_by(D: Array, steep: Array, level: Array, along: Array, step: Step, t: float) -> float:
+    """Return the estimated cost to the end of a step by D + steep t, where V is level - along t."""
+    total, tilted, over = 0.0, 0.0, 0.0
+    for i in range(len(D)):
+        u = D[i] + steep[i] * t
+        x = abs(u)
+        total = extend(total, step.weight[i] * x, step.metric)
+        tilted += step.tilt[i] * u
+        over += step.weight[i] * max(0.0, x - step.velocity[i])
+    ahead = max(level[0] - along[0] * t, level[1] - along[1] * t)
+    price: float = finish(total, step.metric) + tilted + PENALTY * over + ahead
+    return price
+
+
+@jit_inline
+def _best_by(
+    D: Array, steep: Array, level: Array, along: Array, step: Step, h: float, kinks: Array
+) -> float:
+    """Return the t in [-h, h] where the estimate is least; it is convex."""
+    n, count = len(D), 3
+    kinks[0], kinks[1] = -h, h
+    turn = along[0] - along[1]
+    kinks[2] = (level[0] - level[1]) / turn if turn != 0.0 else h
+    if step.metric != MANHATTAN:
+        low, high = -h, h
+        for _ in range(HALVINGS):
+            third = (high - low) / 3.0
+            one, two = low + third, high - third
+            if _price_by(D, steep, level, along, step, one) < _price_by(
+                D, steep, level, along, step, two
+            ):
+                high = two
+            else:
+                low = one
+        return (low + high) / 2.0
+    for i in range(n):
+        if steep[i] != 0.0:
+            for side in range(-1, 2):
+                kinks[count] = (side * step.velocity[i] - D[i]) / steep[i]
+                count += 1
+    best, at = np.inf, 0.0
+    for j in range(count):
+        if abs(kinks[j]) <= h:
+            price = _price_by(D, steep, level, along, step, kinks[j])
+            if price < best:
+                best, at = price, kinks[j]
+    return at
+
+
+@jit_inline
+def _balance_all(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, spare: Spare,
+    out_y: Array,
+) -> None:  # fmt: skip
+    """Fill slopes (n,) of the cost of the step to cell b that balance those of V, as `_balance`.
+
+    The best place is looked for in all parameters of the cell, from t of gamma on, by turns.
+    """
+    n, M = len(D), cells.reach.shape[1]
+    steep, along, place, half, level, kinks = spare
+    for m in range(M + 1):
+        place[m] = along[m, 0] = along[m, 1] = 0.0
+        half[m] = cells.half[b] if m == M else cells.reach[b, m]
+        for i in range(n):
+            steep[m, i] = cells.slope[b, i] if m == M else cells.tied[b, m, i]
+            for c in range(2):
+                along[m, c] += potential.dual[b, c, i] * steep[m, i]
+    place[M] = t
+    for c in range(2):
+        level[c] = potential.level[b, c] - along[M, c] * t
+    for i in range(n):
+        D[i] += steep[M, i] * t
+    for turn in range(ROUNDS * (M + 1)):
+        m = turn % (M + 1)
+        for i in range(n):
+            D[i] -= steep[m, i] * place[m]
+        for c in range(2):
+            level[c] += along[m, c] * place[m]
+        place[m] = _best_by(D, steep[m], level, along[m], step, half[m], kinks)
+        for i in range(n):
+            D[i] += steep[m, i] * place[m]
+        for c in range(2):
+            level[c] -= along[m, c] * place[m]
+    tangent(D, step, out_y)
+    for i in range(n):
+        if abs(D[i]) > step.velocity[i] + STILL:
+            out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
+    if step.metric != MANHATTAN:
+        return
+    tied = abs(level[0] - level[1]) <= 1e-9
+    for turn in range(ROUNDS * (M + 1)):
+        m = turn % (M + 1)
+        if abs(place[m]) >= half[m] * (1.0 - 1e-9):
+            continue
+        least = along[m, 0] if level[0] >= level[1] else along[m, 1]
+        most = least
+        if tied:
+            least, most = min(along[m, 0], along[m, 1]), max(along[m, 0], along[m, 1])
+        slope = 0.0
+        for i in range(n):
+            slope += out_y[i] * steep[m, i]
+        wanted = min(max(slope, least), most)
+        for i in range(n):
+            s, w, x = steep[m, i], step.weight[i], abs(D[i])
+            if s == 0.0 or slope == wanted:
+                continue
+            if x < STILL:
+                low, high = -w, w
+            elif abs(x - step.velocity[i]) < STILL:
+                low, high = w, w * (1.0 + PENALTY)
+                if D[i] < 0:
+                    low, high = -high, -low
+            else:
+                continue
+            y = out_y[i] + (wanted - slope) / s
+            y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
+            slope += (y - out_y[i]) * s
+            out_y[i] = y
+
+
+@jit_inline
 def guess_slopes(
     cells: Cells,
     potential: Potential,
@@ -170,6 +310,7 @@ def guess_slopes(
     D: Array,
     here: Array,
     floor: Array,
+    spare: Spare,
     out_y: Array,
 ) -> int:
     """Fill the slopes of the step that seems best from t in cell a; return its index in `ahead`."""
@@ -196,7 +337,10 @@ def guess_slopes(
             best, at, to = price, where, p
     for i in range(len(here)):
         here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
-    _balance(here, cells, potential, step, ahead[to], at, out_y)
+    if cells.reach.shape[1] > 0:
+        _balance_all(here, cells, potential, step, ahead[to], at, spare, out_y)
+    else:
+        _balance(here, cells, potential, step, ahead[to], at, out_y)
     return to
 
 

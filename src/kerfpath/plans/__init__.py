@@ -2,6 +2,7 @@
 
 import warnings
 
+from kerfpath.plans.plan import OF_BOUND as OF_BOUND
 from kerfpath.plans.plan import PLACING as PLACING
 from kerfpath.plans.plan import STILL as STILL
 from kerfpath.plans.plan import Criteria as Criteria

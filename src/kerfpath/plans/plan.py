@@ -181,7 +181,8 @@ class Proof:
 
     def without_bound(self) -> Proof:
         """Return the proof without bound, gap and certificate, which hold for this motion only."""
-        rest = [part for part in self.statement.split("; ") if part != self.bound_claim]
+        parts = self.statement.split("; ")
+        rest = [p for p in parts if p != self.bound_claim and not p.startswith(OF_BOUND)]
         return replace(self, statement="; ".join(rest), bound=None, gap=None, certificate=None)
 
     @property
@@ -193,6 +194,10 @@ class Proof:
     def gap_shown(self) -> str:
         """The gap in per cent with two decimals, rounded up; "-" if there is none."""
         return "-" if self.gap is None else f"{max(math.ceil(self.gap * 1e4), 0) / 100:.2f}"
+
+
+OF_BOUND = "the bound "
+"""How parts of a statement begin that say more about a bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -415,6 +420,11 @@ class Plan:
         if not self.tilt.any():
             return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
         return freeze(self.frames[:, :3, 2])
+
+    @property
+    def nominal_frames(self) -> Array:
+        """Task frames without tilt, robot base frame at zero of external axes, (K, 4, 4) m."""
+        return freeze(self.T_base_part @ self.contour.frames(self.settings.frames))
 
     @property
     def frames(self) -> Array:
