@@ -115,7 +115,7 @@ def made(plans, short, arm, tool, placement):
 CASES = ("manhattan", "euclid", "chebychev", "rail", "table", "both")
 
 
-@pytest.mark.parametrize("case", ["manhattan", "rail"])
+@pytest.mark.parametrize("case", [pytest.param("manhattan", marks=pytest.mark.slow), "rail"])
 def test_the_costliest_step_is_bounded_too(made, case):
     one = made(case)
     asked = replace(one.settings, objective="max")
