@@ -10,7 +10,7 @@ import pytest
 
 from conftest import ROOT
 from kerfpath.job import foresee, prepare, read_job
-from kerfpath.job.format.tables import TABLES
+from kerfpath.job.format.tables import TABLES, ChartFile
 from kerfpath.post import languages
 
 PAGES = sorted(
@@ -61,9 +61,12 @@ def nested(value, name, key):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_the_jobs_of_a_page_have_only_keys_that_jobs_have(page):
+def test_the_jobs_and_charts_of_a_page_have_only_keys_that_they_have(page):
     for text in blocks(page, "toml"):
-        for name, keys in tables_of(tomllib.loads(text)):
+        if "row" in (tables := tomllib.loads(text)):
+            ChartFile.model_validate(tables)
+            continue
+        for name, keys in tables_of(tables):
             known = set(TABLES[name].model_fields) if name else OF_OTHERS
             known |= set(languages()) if name == "program" else set()
             assert keys <= known, f"{page.name}: [{name}] {sorted(keys - known)}"

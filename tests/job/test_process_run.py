@@ -96,6 +96,15 @@ def test_a_chart_that_was_changed_after_planning_is_found(planned, file, old, ne
     assert words in found.stdout
 
 
+def test_a_chart_may_get_more_rows_and_another_source(planned):
+    folder, _ = planned
+    row = '[[row]]\nmaterial = "copper"\nthickness_mm = 1\nspeed_m_min = 3\n\n'
+    chart = HOLES.replace("[[row]]", f"{row}[[row]]", 1).replace("cut trials", "more trials")
+    for file in ("out/plan.json", "out/job.mod"):
+        result = audited(folder, file, chart)
+        assert result.returncode == 0, result.stdout
+
+
 def test_a_program_in_another_language_is_made_of_the_plan_alone(planned):
     folder, _ = planned
     (folder / "chart.toml").rename(folder / "away.toml")

@@ -92,6 +92,7 @@ CLAIMS = {
     r"counts(/|$)": "poses that were dropped in planning",
     r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
     r"sequence/(optimal|at_least_s)$": "claims about orders that are not in the file",
+    r"job/process/row/\d+/(chart|number|source)$": "where the rows of charts are from",
 }
 """Places that are not compared, and what they hold; none of them defines the motion."""
 DISTANCE = 1e-6
