@@ -337,10 +337,12 @@ class _Certification:
             fits = self._fits(len(self._layers))
             late = fine and self._late(slow, ahead)
             vain = gained < LITTLE and ahead - self.pairs > DEAR * self.most_pairs
-            if fits and self._priced and (late or vain or self._near_ceiling):
+            # Cells may be below the goal though the bound, the best of all layers, is not.
+            reached = not low.any() or (not self.checkable and self.best >= self.goal)
+            if not reached and fits and self._priced and (late or vain):
                 self._divide(cells.take(live))
                 return
-            if not low.any() or len(cells) * left > MOST_CELLS or self._spent(ahead):
+            if reached or len(cells) * left > MOST_CELLS or self._spent(ahead):
                 self._finish(result)
                 return
             if fresh or not self.checkable or 1 - live.mean() > DROPPED:
@@ -368,12 +370,6 @@ class _Certification:
     def _patient(self) -> bool:
         """Whether a time is given, which may be spent though little is to be gained."""
         return self.until < np.inf
-
-    @property
-    def _near_ceiling(self) -> bool:
-        """Whether stages without (6) can gain little of what the bound lacks."""
-        ceiling = self.first_order.ceiling
-        return ceiling - self.best < LITTLE * (self.target - ceiling)
 
     def _more_nodes(self, wanted: bool) -> Ints:
         """Return the nodes of the next stage: more if wanted, or if cells can gain far less."""
