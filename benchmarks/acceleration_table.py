@@ -33,7 +33,7 @@ PLACES = {
     "searched": ([871.36, -411.12, 1159.33], [91.7817, 28.7519, -0.6407]),
 }
 """Where the authors of the public runs had the part: xyz mm, and rpy deg about fixed axes."""
-SPACINGS = (0.02, 0.01, 0.005)
+SPACINGS = (0.02, 0.01)
 """m: distance of the nodes."""
 COLUMNS = (
     "placement",
