@@ -51,7 +51,8 @@ def test_the_plan_says_process_and_times(planned):
     for contour in said["contours"]:
         assert contour["piercing_s"] == pytest.approx(0.3)
         assert contour["gas_s"] == pytest.approx(0.25 + 0.3 + contour["time_s"])
-    assert any("power 1800 W" in note for note in said["notes"])
+    assert any("power 1800 W; " in note for note in said["notes"])
+    assert any("0.2 s 1800 W 1 mm high." in note for note in said["notes"])
 
 
 def test_the_report_has_a_table_of_the_process(planned):
@@ -80,7 +81,12 @@ def test_plan_and_program_pass_with_the_chart_of_the_plan(planned, file):
         pytest.param(
             "job.mod", "gas_lead_s = 0.25", "gas_lead_s = 0.4", "gas", marks=pytest.mark.slow
         ),
-        ("job.mod", "power_w = 1800\n", "power_w = 1500\n", "process sheet"),
+        (
+            "job.mod",
+            "power_w = 1800\n",
+            "power_w = 1500\n",
+            "job.mod, line 6: lines of",
+        ),
         ("plan.json", "kerf_mm = 0.15", "kerf_mm = 0.4", "kerf_mm"),
         pytest.param(
             "plan.json", "nozzle_mm = 1.5", "nozzle_mm = 2", "nozzle_mm", marks=pytest.mark.slow

@@ -106,7 +106,7 @@ def trace(job_file: Path) -> None:
         {"origins": [origin_entry(each) for each in origins], "sheet": [*job.program.remarks]}
     )
     rows = [
-        [escape(each.of), each.key, _shown(each), escape(each.origin), _set_by(each)]
+        [escape(each.of), each.key, escape(each.shown), escape(each.origin), _set_by(each)]
         for each in origins
     ]
     table(["of", "value", "is", "from", "set by"], rows)
@@ -171,11 +171,6 @@ def _rows(chart: Chart) -> None:
         for number, row in enumerate(chart.table.row, 1)
     ]
     table(COLUMNS, rows, numbers=["row", "mm", "m/min", "kerf mm"])
-
-
-def _shown(each: Origin) -> str:
-    value = each.value
-    return "-" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
 def _set_by(each: Origin) -> str:

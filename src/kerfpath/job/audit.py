@@ -67,7 +67,7 @@ from kerfpath.job.plan_file import (
     plan_entry,
     read_plan_file,
 )
-from kerfpath.job.process_sheet import check_sheet
+from kerfpath.job.process_sheet import check_sheet, with_sheet
 from kerfpath.job.program_file import (
     ReadCut,
     add_tips,
@@ -583,8 +583,13 @@ class Audit:
         audit = Audit(expected=replace(self.expected, job=job))
         report = audit.program(program_on_disk(file, job), file.name)
         rows, note = check_sheet(file, job.program.remarks)
-        tables = {name: table + rows * (name == file.name) for name, table in report.tables.items()}
-        return replace(report, tables=tables, note=f"{report.note} {note}".strip())
+        tables, places = dict(report.tables), dict(report.places)
+        for row in rows:
+            there = places[file.name]
+            tables[file.name] = [*tables[file.name], replace(row, node=len(there))]
+            places[file.name] = (*there, f"{with_sheet(file).name}, line {row.node}")
+        note = f"{report.note} {note}".strip()
+        return replace(report, tables=tables, places=places, note=note)
 
     def plan_file(self, path: Path) -> AuditReport:
         """Audit every contour of a plan.json."""

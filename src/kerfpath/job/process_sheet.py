@@ -23,6 +23,8 @@ _REMARK = re.compile(r"[\s\d:;'!#/|]*([-+] .*?)[\s;]*")
 def check_sheet(file: Path, expected: Sequence[str]) -> tuple[list[Check], str]:
     """Return the check that a program has the sheet of its job, and a note if it has none.
 
+    The node of the check is the line of the file at which the sheet begins.
+
     Comments may be removed, but a sheet that differs would have the operator set other values.
 
     Parameters
@@ -32,7 +34,7 @@ def check_sheet(file: Path, expected: Sequence[str]) -> tuple[list[Check], str]:
     expected : sequence of str
         The lines of the sheet of the job; empty without [process].
     """
-    found = _sheet(file.with_name(BESIDE.get(file.suffix.lower(), file.name)))
+    found, begins = _sheet(with_sheet(file))
     if not found:
         return [], MISSING if expected else ""
     wanted = [_bare(line) for line in expected]
@@ -41,24 +43,34 @@ def check_sheet(file: Path, expected: Sequence[str]) -> tuple[list[Check], str]:
     faults = len(wrong) + len(lacking) or int(found != wanted)
     example = (wrong or lacking or [""])[0]
     said = "lines of the process sheet that differ from the job" + (f": {example}" * bool(faults))
-    return [count("sheet", said, faults)], ""
+    return [count("sheet", said, faults, begins)], ""
 
 
-def _sheet(file: Path) -> list[str]:
-    """Return the lines of the sheet in a file, as far as every language writes them alike."""
+def with_sheet(file: Path) -> Path:
+    """Return the file of a program that has its sheet."""
+    return file.with_name(BESIDE.get(file.suffix.lower(), file.name))
+
+
+def _sheet(file: Path) -> tuple[list[str], int]:
+    """Return the lines of the sheet in a file, as far as every language writes them alike.
+
+    Also the number of the first of them, from 1.
+    """
     try:
         lines = file.read_bytes().decode("latin-1").splitlines()
     except OSError:
-        return []
+        return [], 0
     found: list[str] = []
-    for line in lines:
+    begins = 0
+    for number, line in enumerate(lines, 1):
         remark = _REMARK.fullmatch(line)
         bare = "" if remark is None else _bare(remark[1])
         if found and not bare:
             break
         if found or bare == _bare(f"- {TITLE}"):
             found.append(bare)
-    return found
+            begins = begins or number
+    return found, begins
 
 
 def _bare(line: str) -> str:

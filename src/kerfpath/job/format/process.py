@@ -290,6 +290,12 @@ class Origin:
 
     __repr__ = short_repr
 
+    @property
+    def shown(self) -> str:
+        """The value as text; "-" without one."""
+        number = isinstance(self.value, int | float)
+        return "-" if self.value is None else f"{self.value:g}" if number else f"{self.value}"
+
 
 def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
     """Return the values of the process of a job, with the text of its file and its tables."""
@@ -320,7 +326,7 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
             found.append(_origin(name, key, *inner, place, default))
     for row in process.row:
         for key, value, words in by_hand(source, process, row):
-            said = words if key.startswith("pierce") else value
+            said = words.partition(": ")[2] if key.startswith("pierce") else value
             own = "cell" in source and key == "stand_off_mm" and key in written["cell"]
             origin = "job" if own else row.place
             found.append(Origin(of=row.technique, key=key, value=said, origin=origin, by_hand=True))

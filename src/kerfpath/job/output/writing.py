@@ -18,7 +18,7 @@ from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.compensated import compensation_notes
-from kerfpath.job.format import DIFFER, TITLE, Job, origins_of, refusal_at
+from kerfpath.job.format import DIFFER, Job, origins_of, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
@@ -169,7 +169,7 @@ def _process_rows(job: Job) -> list[tuple[str, str, str, str, str]]:
         (
             each.of,
             each.key,
-            "-" if each.value is None else f"{each.value}",
+            each.shown,
             each.origin,
             "hand" if each.by_hand else "program",
         )
@@ -206,7 +206,8 @@ def process_notes(job: Job) -> list[str]:
     lines = job.program.remarks
     if not lines:
         return []
-    said = "; ".join(line[2:] for line in lines if line[2:] not in (TITLE, DIFFER))
+    said = "; ".join(line[2:] if line[0] == "-" else line for line in lines[1:])
+    said = said.replace("; + ", " ").removesuffix(f"; {DIFFER}")
     notes = [f"Set by hand, as no program sets it: {said}."]
     if any(line[2:] == DIFFER for line in lines):
         notes.append(
