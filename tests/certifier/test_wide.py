@@ -17,7 +17,7 @@ from kerfpath.certifier.stages import solve_stage
 from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.kernels.metric import rho
-from kerfpath.plans import path_cost
+from kerfpath.plans import Feed, path_cost
 from kerfpath.robots.external_axes import base_in_part
 from kerfpath.tilt import Tilt
 
@@ -261,3 +261,17 @@ def test_more_work_never_lowers_the_bound(made):
             bounds.append(certify(made("rail")).plan.proof.bound)
     assert bounds == sorted(bounds)
     assert bounds[-1] > 0
+
+
+def test_a_plan_with_a_reduced_feed_has_a_bound(plans):
+    """Its intervals count as long as the longest; motions that keep the limits cost no less."""
+    even = plans(metric="manhattan")
+    slower = np.diff(even.time) * (1 + np.sin(np.linspace(0, np.pi, len(even.q) - 1)))
+    dip = Feed(full=0.0, slowest=0.5, node=15, joint=0, limit="velocity")
+    timed = replace(even, time=np.append(0.0, np.cumsum(slower)), feed=dip)
+    found = certify(timed)
+    assert "; the bound holds for motions at the times of this plan" in found.statement
+    assert found.plan.proof.certificate is None
+    assert 0.5 * timed.cost < found.plan.proof.bound <= timed.cost
+    costs = random_motions(even, 100, seed=6)  # at these times, too, as they are slower
+    assert costs.min() >= found.plan.proof.bound

@@ -174,7 +174,7 @@ def certify(
     why = _why_not(plan)
     if why:
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
-    steps, more = _steps_of(plan), _more_than_gamma(plan)
+    steps, more = _steps_of(plan), _also_for(plan)
     checkable = checkable and not more
     if plan.settings.objective == "max":
         best, rounds, pairs = largest_step_bound(
@@ -214,7 +214,7 @@ def _certified(
 ) -> Certified:
     """Return the plan with its proved bound, and with the stages to keep if there are any.
 
-    `more` is what else it holds for, as `_more_than_gamma` says it.
+    `more` is what else it holds for, as `_also_for` says it.
     """
     bound = max(best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
@@ -234,20 +234,20 @@ def _why_not(plan: Plan) -> str:
     robot = plan.robot
     if robot.family.enclose_all is None:
         return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"
-    if plan.feed is not None:
-        return "the feed is reduced"
     if not plan.cost > 0:
         return "its cost is not above 0"
     return ""
 
 
-def _more_than_gamma(plan: Plan) -> str:
-    """Return what the bound of a plan holds for besides gamma, and what it leaves out; or ""."""
+def _also_for(plan: Plan) -> str:
+    """Return what else the bound of a plan holds for, and what it leaves out; "" if nothing."""
     names, what = [axis.name for axis in plan.robot.externals], []
     if plan.settings.tilt is not None:
         what.append("any tilt within the cone")
     if names:
         what.append(f"any values of {' and '.join(names)}")
+    if plan.feed is not None:
+        what.append("motions at the times of this plan, each interval as long as the longest")
     if not what:
         return ""
     left_out = "the acceleration limit"
@@ -425,7 +425,7 @@ class _Certification:
     @cached_property
     def _priced(self) -> bool:
         """Whether (6) adds more to the cost of the plan than the gap that may be left."""
-        if self.checkable or self.maker.more:
+        if self.checkable or self.maker.more or self.plan.feed is not None:
             return False
         share = np.abs(self.plan.acceleration_share)
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():

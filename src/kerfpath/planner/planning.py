@@ -323,8 +323,8 @@ def plan(
     made = with_bound(made, asked.certify, phase=phase)
     if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
         return made
-    if robot.externals or asked.tilt is not None:  # such a bound is too loose to call for more
-        return made
+    if robot.externals or asked.tilt is not None or made.feed is not None:
+        return made  # such a bound is too loose to call for more
     assert attempt is not None, "the plan is of an attempt"
     with suppress(StopEarly):
         better = better_motion(attempt)
