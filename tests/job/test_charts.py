@@ -264,13 +264,19 @@ def test_a_script_has_the_sheet(job):
 @pytest.mark.parametrize(
     ("process", "words"),
     [
-        ('material = "titanium"\nthickness_mm = 2', ["material", "titanium", "steel"]),
+        ('material = "titanium"\nthickness_mm = 2', ["process.material", "titanium", "steel"]),
         ('material = "steel"\nthickness_mm = 2', ["2: ", "charts/own.toml row 1 (N2)", "gas"]),
-        ('material = "steel"\nthickness_mm = 2\ngas = "Ar"', ["a gas", "Ar", "N2"]),
+        ('material = "steel"\nthickness_mm = 2\ngas = "Ar"', ["process.gas", "a gas", "Ar", "N2"]),
         ('material = "brass"\nthickness_mm = 1', ["got 2", "name the quality"]),
         (
             'material = "steel"\nthickness_mm = 3\ngas = "N2"',
-            ["got 3 mm", "2 mm (charts/own.toml row 1)", "4 mm (charts/own.toml row 2)", "linear"],
+            [
+                "process.thickness_mm",
+                "got 3 mm",
+                "2 mm (charts/own.toml row 1)",
+                "4 mm (charts/own.toml row 2)",
+                "linear",
+            ],
         ),
         (
             'material = "steel"\nthickness_mm = 9\ngas = "N2"\nbetween = "linear"',
@@ -389,7 +395,7 @@ def test_a_fault_of_a_chart_is_one_line_with_its_place(tmp_path, old, new, line,
 
 
 def test_a_name_that_no_file_can_have_is_refused(job):
-    refused(lambda: job(PROCESS + f'chart = "{"x" * 5000}"\n'), "process.material", "a chart")
+    refused(lambda: job(PROCESS + f'chart = "{"x" * 5000}"\n'), "process.chart", "a chart")
     assert_refused(run("charts", "show", "x" * 5000), "a chart")
     assert_refused(run("charts", "check", "x" * 5000), "cannot be read")
 

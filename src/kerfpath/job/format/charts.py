@@ -34,6 +34,15 @@ TABLES = dict(tables_in(ChartFile))
 FIXED = ("gas", "nozzle_mm", "note")
 """Values of which none lies between two others."""
 
+
+class NoRow(InputError):
+    """There is no row for a job, or no single one; `key` of [process] is what to change."""
+
+    def __init__(self, message: str, key: str) -> None:
+        super().__init__(message)
+        self.key = key
+
+
 # -----------------------------------------------------------------------------
 # Files of charts, and the folders that they are found in.
 
@@ -190,8 +199,10 @@ def choose(process: ProcessTable, technique: str, folder: Path) -> JobRowTable:
 
     Raises
     ------
-    InputError
+    NoRow
         No row fits, or several do.
+    InputError
+        The chart that the job names does not exist, or one is not valid.
     """
     wanted = process.model_copy(update={"technique": technique})
     every: list[JobRowTable] = []
@@ -202,9 +213,10 @@ def choose(process: ProcessTable, technique: str, folder: Path) -> JobRowTable:
         if row := _picked([row for row in near if _apart(row, wanted) == least], wanted):
             return row
     if not every:
-        raise InputError(
+        raise NoRow(
             f"expected a chart in {folder / FOLDER} or {user_folder()}, got none; name one with "
-            "chart (kerfpath charts list shows those that are shipped as examples)"
+            "chart (kerfpath charts list shows those that are shipped as examples)",
+            "chart",
         )
     return _between(_fitting(every, wanted), wanted)
 
@@ -252,7 +264,7 @@ def _of_word(rows: Sequence[JobRowTable], word: str, said: str | None) -> list[J
 
 
 def _fitting(rows: Sequence[JobRowTable], wanted: ProcessTable) -> list[JobRowTable]:
-    """Return the rows of the same words, or raise InputError at the first word without a row."""
+    """Return the rows of the same words, or raise NoRow at the first word without a row."""
     found = [row for row in rows if row.material.casefold() == wanted.material.casefold()]
     asked = {"material": wanted.material} if not found else {}
     known = sorted({row.material for row in rows})
@@ -269,21 +281,21 @@ def _fitting(rows: Sequence[JobRowTable], wanted: ProcessTable) -> list[JobRowTa
         found = fitting
     for word, said in asked.items():
         of = "" if word == "material" else f" for {wanted.material}"
-        raise InputError(
-            f'expected a {word} that a chart has{of}, got "{said}"; {nearest(said, known)}'
+        raise NoRow(
+            f'expected a {word} that a chart has{of}, got "{said}"; {nearest(said, known)}', word
         )
     return found
 
 
 def _only(rows: Sequence[JobRowTable]) -> JobRowTable:
-    """Return the only one of several rows, or raise InputError."""
+    """Return the only one of several rows, or raise NoRow."""
     if len(rows) == 1:
         return rows[0]
     word = next(
         (w for w in ("gas", "quality") if len({getattr(row, w) for row in rows}) > 1), "chart"
     )
     which = ", ".join(f"{row.place} ({getattr(row, word) or 'none'})" for row in rows[:4])
-    raise InputError(f"expected one row, got {len(rows)}: {which}; name the {word}")
+    raise NoRow(f"expected one row, got {len(rows)}: {which}; name the {word}", word)
 
 
 def _between(rows: Sequence[JobRowTable], wanted: ProcessTable) -> JobRowTable:
@@ -297,13 +309,16 @@ def _between(rows: Sequence[JobRowTable], wanted: ProcessTable) -> JobRowTable:
     shown = ", ".join(f"{row.thickness_mm:g} mm ({row.place})" for row in (*under, *over)[:4])
     got = f"{wanted.thickness_mm:g} mm"
     if not (under and over):
-        raise InputError(
-            f"expected the thickness of a row, got {got}; the nearest has {shown}; add a row for it"
+        raise NoRow(
+            f"expected the thickness of a row, got {got}; the nearest has {shown}; add a row for "
+            "it",
+            "thickness_mm",
         )
     if wanted.between == "refuse":
-        raise InputError(
+        raise NoRow(
             f"expected the thickness of a row, got {got}; the nearest have {shown}; add a row, or "
-            'write between = "linear"'
+            'write between = "linear"',
+            "thickness_mm",
         )
     one, two = _picked(under, wanted), _picked(over, wanted)
     assert one is not None  # rows of the quality are left
@@ -325,9 +340,10 @@ def _interpolated(one: JobRowTable, two: JobRowTable, wanted: ProcessTable) -> J
             return tuple(between(x, y, name) for x, y in zip(a, b, strict=True))
         if isinstance(a, dict) and isinstance(b, dict):
             return {key: between(a[key], b[key], key) for key in a}
-        raise InputError(
+        raise NoRow(
             f"expected {name} alike in {which}, as none lies between, got {_said(a)} and "
-            f"{_said(b)}; add a row of {wanted.thickness_mm:g} mm"
+            f"{_said(b)}; add a row of {wanted.thickness_mm:g} mm",
+            "thickness_mm",
         )
 
     kept = ("chart", "number", "source", "example", "machine", "note")

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
-from kerfpath.job.format.charts import choose
+from kerfpath.job.format.charts import NoRow, choose
 from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.tables import (
     TABLES,
@@ -104,8 +104,9 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
         try:
             row = chosen.get(technique) or choose(process, technique, path.parent)
         except InputError as error:
-            own = "technique" in contour
-            at = ("contour", number, "technique") if own else ("process", "material")
+            key = error.key if isinstance(error, NoRow) else "chart"
+            own = "technique" in contour and key == "technique"
+            at = ("contour", number, key) if own else ("process", key)
             fault = refusal_at(path, at, f"{error}")
             faults += [] if any(one.message == fault.message for one in faults) else [fault]
             continue
