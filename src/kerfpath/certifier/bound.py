@@ -139,7 +139,8 @@ def certify(
     """Return the plan with a proved lower bound on the cost of any motion along its contour.
 
     The bound holds for any motion that keeps (5) and (6) at the nodes, the ranges of the joints and
-    their couplings, at any gamma, in the postures that the plan may use, on any turn. Unless it is
+    their couplings, at any gamma, in the postures that the plan may use, on any turn, and at any
+    tilt within the cone and any values of external axes if the plan has these. Unless it is
     checkable, it also counts on elbow, wrist and flange to stay above the floor of the plan, if
     there is one. Other constraints of the plan (cell, comfort, periodic closure, rotation limits)
     can only raise the cost of the best motion.

@@ -209,6 +209,8 @@ class CellMaker:
     ----------
     more : bool
         Whether there are other parameters than gamma.
+    columns : int
+        Number of coarsest cells of a node, before postures and turns.
     turns : (n,) bool
         Which joints are angles that are known up to full turns.
     endless : (n,) bool
@@ -250,13 +252,14 @@ class CellMaker:
         self._weight = np.ones(len(limits.endless)) if weight is None else np.asarray(weight)
         self._first_at, self._first_reach = self._first_parameters()
         self.more = self._first_at.shape[1] > 0
+        self.columns = len(self._first_at) * self._circle
         self.turns = np.arange(len(limits.endless)) < robot.arm.joints
         self.turns |= limits.endless
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the coarsest cells at some nodes, in postures and turns within the ranges."""
         coarse = COARSE_LEVEL if self.more else 0
-        each, columns = int(BASE * 2.0**coarse), len(self._first_at)
+        each, columns = self._circle, len(self._first_at)
         node = np.repeat(nodes.astype(np.int32), each * columns)
         index = np.tile(np.repeat(np.arange(each, dtype=np.int32), columns), len(nodes))
         column = np.tile(np.arange(columns), each * len(nodes))
@@ -269,6 +272,11 @@ class CellMaker:
             keys = node[part], level[part], index[part], cuts[part], at, reach
             sets.append(self.lifted(self._enclosed_all(*keys)[0]))
         return CellSet.join(sets)
+
+    @property
+    def _circle(self) -> int:
+        """Number of coarsest cells of the circle of gamma."""
+        return int(BASE * 2.0**COARSE_LEVEL) if self.more else BASE
 
     def _first_parameters(self) -> tuple[Array, Array]:
         """Return middle and half-width (B, M) of the first boxes of the other parameters."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Ints
 from kerfpath.certificate import ALLOWANCE, cell_bounds
-from kerfpath.certifier.cells import CellSet, cell_maker, foldable
+from kerfpath.certifier.cells import MORE_CELLS, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.motion_slopes import motion_slopes
 from kerfpath.certifier.parts import CARE, SAME_COST
@@ -31,6 +31,11 @@ DEEPEST = 12
 """Largest average level of the parameters of a cell."""
 MOST_CELLS = 500_000
 """Most cells of a stage."""
+MOST_REGIONS = 60_000
+"""Most regions that are enclosed before the first stage; with more there is no bound above 0."""
+LINKED, MOST_PAIRS = 0.1, 1e9
+"""Share of all pairs of cells of neighbouring layers that steps join at least, to judge the work of
+the first stage; and the most pairs with a time limit."""
 MOST_SETS = 5
 """Most motions whose slopes a stage tries."""
 AGAIN = 0.05
@@ -96,7 +101,15 @@ def wide_bound(
     quick = maker.endless & (steps.farthest > LONGEST)
     fastest = float(steps.velocity[quick].max(initial=LONGEST / len(plan.q)))
     nodes = _first_nodes(plan, steps, fastest)
-    cells = maker.certain(maker.coarsest(nodes), steps.weight, UNCERTAIN * plan.cost)
+    if len(nodes) * maker.columns > MOST_REGIONS:  # hopeless with several long axes
+        return 0.0, 0, 0
+    cells = maker.coarsest(nodes)
+    if MORE_CELLS * len(cells) <= MOST_REGIONS:
+        cells = maker.certain(cells, steps.weight, UNCERTAIN * plan.cost)
+    each = np.unique(cells.node, return_counts=True)[1].astype(float)
+    all_steps = float(each[:-1] @ each[1:])
+    if spent(LINKED * all_steps) or all_steps > MOST_PAIRS:
+        return 0.0, 0, 0
 
     def slopes_of(gamma: Array, at: Array, posture: Ints) -> list[Array]:
         found = motion_slopes(maker, nodes, gamma, at, posture, steps)
