@@ -23,7 +23,7 @@ def test_where_a_program_stops_it_stops(controller):
 
 
 @pytest.mark.parametrize(("percent", "stated", "time"), [
-    (100, None, 0.1), (50, None, 0.05), (100, 40.0, 0.04), (25, 40.0, 0.01),
+    (100, None, 0.12), (50, None, 0.06), (100, 40.0, 0.04), (25, 40.0, 0.01),
 ])  # fmt: skip
 def test_cnt_rounds_by_time_in_proportion(percent, stated, time):
     settings = FanucSettings(cnt_percent=percent, corner_ms=stated)

@@ -169,7 +169,7 @@ def test_the_given_order_is_kept_on_request(folder):
 BAD = [
     ("count = 2\n[[contour]]", "count = 0\n[[contour]]", "count: expected a whole number from 1"),
     ('shape = "arc"\nangle_deg = 90', "angle_deg = 100", 'angle_deg up to 90 with shape = "line"'),
-    ("length_mm = 3\n", "length_mm = -3\n", "lead_out.length_mm: expected a number above 0"),
+    ("length_mm = 3\n", "length_mm = -3\n", "lead_out.length_mm: expected a number not below 0"),
     ("start_mm = 10", 'start_mm = 10\nstart = "smoothest"', "start or start_mm, got both"),
     ("[sequence]", "[sequences]", "nearest: sequence"),
     ("home_deg = [0, -20, 10, 0, 60, 0]", "home_deg = [0, 0]", "6 numbers, one for every joint"),
