@@ -5,7 +5,7 @@ The audit interpolates tables of accelerations by itself: it shares no code with
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -86,17 +86,18 @@ def _corners(robot: Robot, low: Array, high: Array) -> Iterator[Array]:
 
 def most_accelerations(robot: Robot) -> Array:
     """Return the largest accelerations (n,) rad/s^2 at any configuration."""
-    _, constant = robot.speed_limits()
-    found, table = constant.copy(), robot.limits.acceleration_table
-    for joint, nodes in {} if table is None else table.limits.items():
-        found[joint - 1] = nodes.max()
-    return found
+    return _over_all(robot, np.max)
 
 
 def least_accelerations(robot: Robot) -> Array:
     """Return the accelerations (n,) rad/s^2 that hold at every configuration."""
+    return _over_all(robot, np.min)
+
+
+def _over_all(robot: Robot, extreme: Callable[[Array], float]) -> Array:
+    """Return the accelerations (n,), of joints with a table the extreme one of its nodes."""
     _, constant = robot.speed_limits()
     found, table = constant.copy(), robot.limits.acceleration_table
     for joint, nodes in {} if table is None else table.limits.items():
-        found[joint - 1] = nodes.min()
+        found[joint - 1] = extreme(nodes)
     return found

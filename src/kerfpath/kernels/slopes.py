@@ -131,37 +131,24 @@ def _mix(D: Array, cells: Cells, step: Step, b: int, missing: float, out_y: Arra
 
 
 @jit_inline
-def _balance(
-    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
-) -> None:
-    """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there.
-
-    The slope of a joint that is still, or at its velocity limit, may have any value in a range.
-    """
-    level0 = potential.level[b, 0] - potential.along[b, 0] * t
-    level1 = potential.level[b, 1] - potential.along[b, 1] * t
-    least = potential.along[b, 0] if level0 >= level1 else potential.along[b, 1]
-    most = least
-    if abs(level0 - level1) <= 1e-9:
-        least = min(potential.along[b, 0], potential.along[b, 1])
-        most = max(potential.along[b, 0], potential.along[b, 1])
-    for i in range(len(D)):
-        D[i] += cells.slope[b, i] * t
+def _tangent(D: Array, step: Step, out_y: Array) -> None:
+    """Fill the slopes (n,) of the cost of a step by D, where one beyond (5) has its price."""
     tangent(D, step, out_y)
-    slope = 0.0
     for i in range(len(D)):
         if abs(D[i]) > step.velocity[i] + STILL:
             out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
-        slope += out_y[i] * cells.slope[b, i]
-    if least <= slope <= most:
-        return
-    wanted = least if slope < least else most
-    if step.metric == CHEBYCHEV:
-        _mix(D, cells, step, b, wanted - slope, out_y)
-    if step.metric != MANHATTAN:
-        return
+
+
+@jit_inline
+def _turn_free(
+    D: Array, steep: Array, step: Step, slope: float, wanted: float, out_y: Array
+) -> None:
+    """Turn the slope along ``steep`` (n,) to the one that is wanted, as far as joints are free to.
+
+    The slope of a joint that is still, or at its velocity limit, may have any value in a range.
+    """
     for i in range(len(D)):
-        s, w, x = cells.slope[b, i], step.weight[i], abs(D[i])
+        s, w, x = steep[i], step.weight[i], abs(D[i])
         if s == 0.0:
             continue
         if x < STILL:
@@ -176,6 +163,33 @@ def _balance(
         y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
         slope += (y - out_y[i]) * s
         out_y[i] = y
+
+
+@jit_inline
+def _balance(
+    D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
+) -> None:
+    """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there."""
+    level0 = potential.level[b, 0] - potential.along[b, 0] * t
+    level1 = potential.level[b, 1] - potential.along[b, 1] * t
+    least = potential.along[b, 0] if level0 >= level1 else potential.along[b, 1]
+    most = least
+    if abs(level0 - level1) <= 1e-9:
+        least = min(potential.along[b, 0], potential.along[b, 1])
+        most = max(potential.along[b, 0], potential.along[b, 1])
+    for i in range(len(D)):
+        D[i] += cells.slope[b, i] * t
+    _tangent(D, step, out_y)
+    slope = 0.0
+    for i in range(len(D)):
+        slope += out_y[i] * cells.slope[b, i]
+    if least <= slope <= most:
+        return
+    wanted = least if slope < least else most
+    if step.metric == CHEBYCHEV:
+        _mix(D, cells, step, b, wanted - slope, out_y)
+    if step.metric == MANHATTAN:
+        _turn_free(D, cells.slope[b], step, slope, wanted, out_y)
 
 
 @jit_inline
@@ -262,10 +276,7 @@ def _balance_all(
             D[i] += steep[m, i] * place[m]
         for c in range(2):
             level[c] -= along[m, c] * place[m]
-    tangent(D, step, out_y)
-    for i in range(n):
-        if abs(D[i]) > step.velocity[i] + STILL:
-            out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
+    _tangent(D, step, out_y)
     if step.metric != MANHATTAN:
         return
     tied = abs(level[0] - level[1]) <= 1e-9
@@ -281,22 +292,8 @@ def _balance_all(
         for i in range(n):
             slope += out_y[i] * steep[m, i]
         wanted = min(max(slope, least), most)
-        for i in range(n):
-            s, w, x = steep[m, i], step.weight[i], abs(D[i])
-            if s == 0.0 or slope == wanted:
-                continue
-            if x < STILL:
-                low, high = -w, w
-            elif abs(x - step.velocity[i]) < STILL:
-                low, high = w, w * (1.0 + PENALTY)
-                if D[i] < 0:
-                    low, high = -high, -low
-            else:
-                continue
-            y = out_y[i] + (wanted - slope) / s
-            y = min(max(y, step.tilt[i] + low), step.tilt[i] + high)
-            slope += (y - out_y[i]) * s
-            out_y[i] = y
+        if slope != wanted:
+            _turn_free(D, steep[m], step, slope, wanted, out_y)
 
 
 @jit_inline

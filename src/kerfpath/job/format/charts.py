@@ -31,6 +31,8 @@ NEAR = 0.01
 """Share of a thickness by which that of a row may differ: sheets are thinner or thicker by more."""
 TABLES = dict(tables_in(ChartFile))
 """The model of each table of a chart."""
+WORDS = ("material", "technique", "gas", "quality")
+"""What has to fit besides the thickness; the quality last, as only some rows have one."""
 FIXED = ("gas", "nozzle_mm", "note")
 """Values of which none lies between two others."""
 
@@ -238,9 +240,20 @@ def _apart(row: RowTable, wanted: ProcessTable) -> float:
 
 def _alike(rows: Sequence[JobRowTable], wanted: ProcessTable) -> list[JobRowTable]:
     """Return the rows of the same material, technique and gas."""
-    found = [row for row in rows if row.material.casefold() == wanted.material.casefold()]
-    found = [row for row in found if row.technique == wanted.technique]
-    return found if wanted.gas is None else _of_word(found, "gas", wanted.gas)
+    found = list(rows)
+    for word in WORDS[:-1]:
+        found = _with(found, word, wanted)
+    return found
+
+
+def _with(rows: Sequence[JobRowTable], word: str, wanted: ProcessTable) -> list[JobRowTable]:
+    """Return the rows that fit one of `WORDS`; a gas or quality that is not said fits all."""
+    said = getattr(wanted, word)
+    if word == "material":
+        return [row for row in rows if row.material.casefold() == said.casefold()]
+    if word == "technique":
+        return [row for row in rows if row.technique == said]
+    return list(rows) if said is None else _of_word(rows, word, said)
 
 
 def _picked(rows: Sequence[JobRowTable], wanted: ProcessTable) -> JobRowTable | None:
@@ -265,25 +278,18 @@ def _of_word(rows: Sequence[JobRowTable], word: str, said: str | None) -> list[J
 
 def _fitting(rows: Sequence[JobRowTable], wanted: ProcessTable) -> list[JobRowTable]:
     """Return the rows of the same words, or raise NoRow at the first word without a row."""
-    found = [row for row in rows if row.material.casefold() == wanted.material.casefold()]
-    asked = {"material": wanted.material} if not found else {}
-    known = sorted({row.material for row in rows})
-    for word in ("technique", "gas", "quality"):
-        if asked or (said := getattr(wanted, word)) is None:
-            continue
-        if word == "technique":
-            fitting = [row for row in found if row.technique == said]
-        else:
-            fitting = _of_word(found, word, said)
+    found = list(rows)
+    for word in WORDS:
+        fitting = _with(found, word, wanted)
         if not fitting:
-            asked = {word: said}
+            said = getattr(wanted, word)
+            of = "" if word == "material" else f" for {wanted.material}"
             known = sorted({getattr(row, word) or "none" for row in found})
+            raise NoRow(
+                f'expected a {word} that a chart has{of}, got "{said}"; {nearest(said, known)}',
+                word,
+            )
         found = fitting
-    for word, said in asked.items():
-        of = "" if word == "material" else f" for {wanted.material}"
-        raise NoRow(
-            f'expected a {word} that a chart has{of}, got "{said}"; {nearest(said, known)}', word
-        )
     return found
 
 

@@ -52,14 +52,19 @@ class StageTable(Table):
     focus_mm: Focus = None
 
 
-class RowTable(Table):
-    """[[row]]: the values of one material, thickness, gas, quality and technique."""
+class CutTable(Table):
+    """What is cut and how, by which rows are chosen."""
 
     material: Material
     thickness_mm: Thickness
     gas: Gas = None
     quality: Quality = None
     technique: Technique = NORMAL
+
+
+class RowTable(CutTable):
+    """[[row]]: the values of one material, thickness, gas, quality and technique."""
+
     speed_m_min: Annotated[
         Positive, key("a number above 0, at most 500, in m/min", "4.2", le=500)
     ]  # fmt: skip
@@ -145,14 +150,9 @@ class JobRowTable(RowTable):
         return f"{self.chart}{number}" if self.chart else "[[process.row]]"
 
 
-class ProcessTable(Table):
+class ProcessTable(CutTable):
     """[process]: what is cut, and the chart that has the values for it."""
 
-    material: Material
-    thickness_mm: Thickness
-    gas: Gas = None
-    quality: Quality = None
-    technique: Technique = NORMAL
     chart: Annotated[
         Text | None, key("the path of a chart, or the name of one", '"charts/steel.toml"')
     ] = None
