@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,12 +11,13 @@ from clarabel import NonnegativeConeT, SecondOrderConeT, ZeroConeT
 from scipy import sparse
 
 from kerfpath.arrays import Array
+from kerfpath.memory import require_memory
 
 __all__ = ["ConicSolution", "NonnegativeConeT", "SecondOrderConeT", "ZeroConeT", "minimise"]
 
 SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
-ROOM = 16 * 1024**2
-"""Bytes that a small program may take."""
+ROOM = 64 * 1024**2
+"""Bytes that a small program may take; glibc maps as much for a thread that asks first."""
 ROOM_PER_ENTRY = 1024
 """Further bytes for each entry of the rows; up to 250 were seen in programs of 100 nodes."""
 
@@ -51,18 +51,10 @@ def minimise(
         There is too little memory: Clarabel would end the process.
     """
     rows = sparse.csc_matrix(rows)
-    _need(ROOM + ROOM_PER_ENTRY * rows.nnz)
+    require_memory(ROOM + ROOM_PER_ENTRY * rows.nnz)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = threads
     none = sparse.csc_matrix((len(cost), len(cost)))
     found = clarabel.DefaultSolver(none, cost, rows, bounds, list(cones), settings).solve()
     return ConicSolution(np.array(found.x), np.array(found.z), found.status in SOLVED)
-
-
-def _need(size: int) -> None:
-    """Raise MemoryError unless `size` bytes can be allocated."""
-    try:
-        mmap.mmap(-1, size).close()
-    except OSError as error:
-        raise MemoryError(f"{size / 1e6:.0f} MB are not free") from error

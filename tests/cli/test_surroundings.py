@@ -86,7 +86,7 @@ def test_a_number_of_threads_that_is_none_is_one_line(number, job, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("megabytes", [600, 800, 1000])
+@pytest.mark.parametrize("megabytes", [600, 1000, 1200])
 def test_little_memory_is_one_line_or_enough(megabytes, job, tmp_path):
     def bound():
         resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))

@@ -6,11 +6,17 @@ from kerfpath.cli.stop import stoppable
 from kerfpath.cli.streams import settle
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
+from kerfpath.memory import require_memory
 
 __all__ = ["main"]
 
 SAID_OF_MEMORY = ("failed to map segment", "annot allocate memory", "can't start new thread")
 """What errors of libraries, imports and threads say where there is no memory."""
+AT_START = 1300 * 1024**2
+"""Bytes of addresses that the libraries of a command that plans take (OCP 500, LLVM 200 MB ...).
+
+Each of them ends with less in a way of its own: an error of some type, or the whole process.
+"""
 NO_MEMORY = "there is not enough memory for this; free some, or raise the limit (ulimit -v)"
 
 
@@ -18,6 +24,7 @@ def main() -> None:
     """Run the command line and exit with its exit code."""
     try:
         settle()  # before anything is opened
+        require_memory(AT_START)
         with stoppable():  # from the first import on
             require_extra("programs", "the command line")
             from kerfpath.cli import programs, studies
