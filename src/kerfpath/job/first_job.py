@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from os.path import relpath
 from pathlib import Path
@@ -14,7 +13,7 @@ from kerfpath.cad import EDGE_TURN, GAP, Loop, Machine, Part
 from kerfpath.cad.drawing_frame import ASK
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.format import Drawing, pose
+from kerfpath.job.format import Drawing, pose, toml_lines, toml_value
 from kerfpath.post import languages
 from kerfpath.robots import Robot
 from kerfpath.robots import robot as library_robot
@@ -125,7 +124,7 @@ def job_text(
         robot=used.id,
         chosen="" if robot else '   # guess, a placeholder: yours, see "kerfpath robots"',
         accelerations=_accelerations(used),
-        name=json.dumps(file, ensure_ascii=False),
+        name=toml_value(file),
         reading=("" if drawing is None else _reading(drawing)) + _frame(part),
         xyz=xyz,
         rpy=list(rpy),
@@ -185,7 +184,7 @@ def _reading(drawing: Drawing) -> str:
         "drawing_frame": drawing.drawing_frame,
         "machine": None if drawing.machine is None else _machine(drawing.machine),
     }
-    return "".join(f"{key} = {_toml(value)}\n" for key, value in given.items() if value is not None)
+    return toml_lines({key: value for key, value in given.items() if value is not None})
 
 
 def _frame(part: Part) -> str:
@@ -206,15 +205,6 @@ def _machine(machine: Machine) -> dict[str, object]:
         "centre_mm": np.round(np.multiply(machine.centre, 1e3), 9) if any(machine.centre) else None,
     }
     return {key: value for key, value in given.items() if value is not None}
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, Mapping):
-        inside = ", ".join(f"{_toml(key)} = {_toml(own)}" for key, own in value.items())
-        return f"{{ {inside} }}"
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _cut(part: Part, chosen: Sequence[Loop], aside: Sequence[Loop]) -> str:
@@ -241,7 +231,7 @@ def _spacing(part: Part, along: Contour) -> float:
 
 
 def _contour(loop: Loop, spacing: float) -> str:
-    name = json.dumps(loop.name, ensure_ascii=False)
+    name = toml_value(loop.name)
     return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
 
 

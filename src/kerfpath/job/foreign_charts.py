@@ -6,7 +6,6 @@ They become the text of a chart, with notes on what they lack and on what was le
 from __future__ import annotations
 
 import csv
-import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +18,7 @@ from pydantic import ValidationError
 
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
-from kerfpath.job.format import ChartFile, RowTable
+from kerfpath.job.format import ChartFile, RowTable, toml_lines
 from kerfpath.text import NOT_TEXT, named
 
 MOST_BYTES = 10_000_000
@@ -112,20 +111,7 @@ def read_foreign(
 
 def chart_text(source: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the text of a chart with these rows, by the keys of a chart."""
-    parts = [f"source = {_toml(source)}"]
-    for row in rows:
-        parts.append("\n".join(["", "[[row]]", *(f"{k} = {_toml(v)}" for k, v in row.items())]))
-    return "\n".join(parts) + "\n"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    return f"{value:.10g}"
+    return toml_lines({"source": source}) + "".join(f"\n[[row]]\n{toml_lines(r)}" for r in rows)
 
 
 def _checked(file: Path, made: Converted) -> str:

@@ -1,12 +1,15 @@
-"""Read a TOML file into its tables, or refuse it in one line that names the place."""
+"""TOML files: read into tables or refused in one line that names the place; values written."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from kerfpath.cad import SUFFIXES
 from kerfpath.errors import InputError
@@ -16,6 +19,7 @@ from kerfpath.text import NOT_TEXT, named
 MOST_TEXT = 10_000_000
 """Largest file, in characters; enough for many thousand contours."""
 NOT_IN_STRINGS = re.compile(rf"{NOT_TEXT.pattern}|[\t\r\n]")
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
 
 
@@ -117,3 +121,23 @@ def read_tables(path: Path, text: str, what: str, needed: str) -> dict[str, Any]
     if not tables:
         raise error_at(path, 1, f"expected {needed}, got an empty file; add them")
     return tables
+
+
+def toml_lines(table: Mapping[str, object]) -> str:
+    """Return the lines of a table, each `key = value`."""
+    return "".join(f"{_toml_key(key)} = {toml_value(value)}\n" for key, value in table.items())
+
+
+def toml_value(value: object) -> str:
+    """Return a value as TOML writes it, on one line; numbers to ten digits."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(toml_lines(value).split("\n")[:-1]) + " }"
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, (bool, str)):
+        return json.dumps(value, ensure_ascii=False)
+    return f"{value:.10g}"
+
+
+def _toml_key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)
