@@ -14,6 +14,7 @@ from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier.cells import CellMaker, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.first_order import FirstOrder
+from kerfpath.certifier.lever_arms import lever_bounds
 from kerfpath.certifier.minimax import largest_step_bound
 from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.parts import CARE, DEAREST, NARROW, SAME_COST, Parts
@@ -172,11 +173,13 @@ def certify(
     until = np.inf
     if seconds is not None:
         until = monotonic() + scalar(seconds, "seconds", unit="s", above=0.0)
-    why = _why_not(plan)
-    if why:
+    if not plan.cost > 0:
+        why = "its cost is not above 0"
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
     steps, more = _steps_of(plan), _also_for(plan)
     checkable = checkable and not more
+    if plan.robot.family.enclose_all is None:
+        return _certified(plan, _lever_bound(plan, steps), gap, None, 0, 0, more)
     if plan.settings.objective == "max":
         best, rounds, pairs = largest_step_bound(
             plan, steps, gap, lambda: monotonic() > until, progress
@@ -191,6 +194,7 @@ def certify(
             return monotonic() > until if until < np.inf else pairs > most
 
         best, rounds, pairs = wide_bound(plan, steps, gap, spent, progress)
+        best = max(best, _lever_bound(plan, steps))
         return _certified(plan, best, gap, None, rounds, pairs, more)
     certification = _Certification(plan, steps, gap, until, most, checkable, progress)
     try:
@@ -230,14 +234,10 @@ def _certified(
     )
 
 
-def _why_not(plan: Plan) -> str:
-    """Return the reason why no bound of a plan can be proved; "" if one can."""
-    robot = plan.robot
-    if robot.family.enclose_all is None:
-        return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"
-    if not plan.cost > 0:
-        return "its cost is not above 0"
-    return ""
+def _lever_bound(plan: Plan, steps: Steps) -> float:
+    """Return the bound on the cost of a plan from lever arms."""
+    least = lever_bounds(plan, steps)
+    return float(least.max() if plan.settings.objective == "max" else least.sum())
 
 
 def _also_for(plan: Plan) -> str:
@@ -249,12 +249,15 @@ def _also_for(plan: Plan) -> str:
         what.append(f"any values of {' and '.join(names)}")
     if plan.feed is not None:
         what.append("motions at the times of this plan, each interval as long as the longest")
+    holds = f"holds for {' and '.join(what)}, " if what else ""
+    if plan.robot.family.enclose_all is None:
+        return f"{OF_BOUND}{holds}takes only lever arms into account, has no certificate"
     if not what:
         return ""
     left_out = "the acceleration limit"
     if plan.settings.tilt is not None and plan.settings.tilt.cost:
         left_out += " and the cost of the tilt"
-    return f"{OF_BOUND}holds for {' and '.join(what)}, leaves out {left_out}, has no certificate"
+    return f"{OF_BOUND}{holds}leaves out {left_out}, has no certificate"
 
 
 def _steps_of(plan: Plan) -> Steps:

@@ -217,7 +217,10 @@ def _deviations(
     if job.compensation is None:
         advice = _closer(run, off, plan, path, tip)
     elif by_model:
-        advice = "targets are not where compensation moves them: write the program again"
+        advice = (
+            "targets are not moved as compensation asks: see there if it is refused, else write "
+            "the program again"
+        )
     else:
         advice = "by the model of the response; the measured runs say what is really left"
     # Of corners alone unless the joints lag; then by a model, which no program is refused for.

@@ -323,7 +323,7 @@ def plan(
     made = with_bound(made, asked.certify, phase=phase)
     if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
         return made
-    if robot.externals or asked.tilt is not None or made.feed is not None:
+    if not robot.encloses or asked.tilt is not None or made.feed is not None:
         return made  # such a bound is too loose to call for more
     assert attempt is not None, "the plan is of an attempt"
     with suppress(StopEarly):
