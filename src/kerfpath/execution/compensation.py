@@ -285,10 +285,10 @@ class Compensator:
     def _tried(self, plan: Plan, displacement: Array) -> _Tried:
         run = self.run(plan, False)
         if not run.reached:
-            return _Tried(plan, displacement, run.T[:, :3, 3], np.inf)
+            return _Tried(plan, displacement, run.T[:, :3, 3], np.inf, 0.0)
         alone = replace(self.response, sigma_range=None)
         off = path_error(run, self.path, timing=timing_of(run), response=alone)
-        return _Tried(plan, displacement, off.T[:, :3, 3], off.largest)
+        return _Tried(plan, displacement, off.T[:, :3, 3], off.largest, float(off.s[off.worst]))
 
     def _chosen(self, plan: Plan, tried: Sequence[_Tried]) -> Compensation:
         """Return the best of the rounds that break nothing; or why there is none."""
@@ -296,8 +296,8 @@ class Compensator:
         for best in reversed(tried):
             if best.rest > self.tolerance:
                 why = why or (
-                    f"with moved targets the executed path is still {best.rest * 1e3:.2g} mm off "
-                    f"the drawing, allowed {self.tolerance * 1e3:g} mm"
+                    f"with moved targets the executed path at s = {best.at * 1e3:.1f} mm is still "
+                    f"{best.rest * 1e3:.2g} mm off the drawing, allowed {self.tolerance * 1e3:g} mm"
                 )
                 break
             run = self.run(best.plan, True)
@@ -330,12 +330,17 @@ class Compensator:
 
 
 class _Tried(NamedTuple):
-    """A plan with moved nodes, the displacements (K, 3) m, the executed way (m, 3) m, its rest."""
+    """A plan with moved nodes, the displacements (K, 3) m, and the executed way (m, 3) m.
+
+    The rest is the largest distance of the way from the drawn path, m, and `at` the arc length of
+    the path there, m.
+    """
 
     plan: Plan
     displacement: Array
     way: Array
     rest: float
+    at: float
 
     @property
     def largest(self) -> float:
