@@ -34,6 +34,7 @@ from kerfpath.job import (
     Job,
     JobResult,
     origins_of,
+    power_of,
     prepare,
     process_times,
     read_job,
@@ -270,7 +271,21 @@ def _times_entry(job: Job, cut: CutResult) -> dict[str, object]:
     if cut.plan is None:
         return {}
     _, pierced, gas = process_times(job, cut)
-    return {"piercing_s": pierced, "gas_s": gas}
+    return {"piercing_s": pierced, "gas_s": gas, "power": _power_entry(job, cut)}
+
+
+def _power_entry(job: Job, cut: CutResult) -> dict[str, object] | None:
+    along = power_of(job, cut)
+    if along is None:
+        return None
+    return {
+        "s_m": along.s.tolist(),
+        "speed_share": along.speed.tolist(),
+        "asked_share": along.asked.tolist(),
+        "power_share": along.set.tolist(),
+        "changes": along.switches,
+        "largest_difference": along.difference,
+    }
 
 
 def _process_entry(job: Job) -> dict[str, object] | None:

@@ -38,6 +38,12 @@ from kerfpath.execution.path_error import on_chords as on_chords
 from kerfpath.execution.path_error import path_error as path_error
 from kerfpath.execution.path_error import roundness as roundness
 from kerfpath.execution.path_error import share_within as share_within
+from kerfpath.execution.power import PowerAlong as PowerAlong
+from kerfpath.execution.power import executed_speeds as executed_speeds
+from kerfpath.execution.power import lit_of as lit_of
+from kerfpath.execution.power import power_along as power_along
+from kerfpath.execution.power import shares_of as shares_of
+from kerfpath.execution.power import with_power as with_power
 from kerfpath.execution.response import ASSUMED as ASSUMED
 from kerfpath.execution.response import IDEAL as IDEAL
 from kerfpath.execution.response import Response as Response

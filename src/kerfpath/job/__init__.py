@@ -58,6 +58,7 @@ from kerfpath.job.output import ProgramPlaces as ProgramPlaces
 from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text
+from kerfpath.job.output import power_of as power_of
 from kerfpath.job.output import process_times as process_times
 from kerfpath.job.output import program_places as program_places
 from kerfpath.job.output import program_texts as program_texts

@@ -67,6 +67,7 @@ from kerfpath.job.plan_file import (
     plan_entry,
     read_plan_file,
 )
+from kerfpath.job.power import check_power, without_power
 from kerfpath.job.process_sheet import check_sheet, with_sheet
 from kerfpath.job.program_file import (
     ReadCut,
@@ -657,6 +658,9 @@ class Audit:
             cut = divide_arcs(cut, candidate.dt, job)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
             tables[title], along = check_cut(job, candidate, cut, cell)
+            if not np.isnan(cut.q).any():
+                moves = _moves(cut, job.program.rules.controller)
+                tables[title] += check_power(job, cut.group, moves, cut.ends)
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)
@@ -840,7 +844,7 @@ def _as_expected(
     except InputError as error:
         said = f"the program of the job cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
-    return compare(expected, read, of="the job", rules=(job.program.rules,))
+    return compare(expected, without_power(read), of="the job", rules=(job.program.rules,))
 
 
 def _closest(cut: ReadCut, contours: Sequence[ExpectedContour]) -> tuple[float, int, int]:

@@ -172,6 +172,8 @@ def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event
             )
             clock += took
             for switch in move.switches:
+                if switch.signal == "power":  # see kerfpath.job.power
+                    continue
                 time = clock - switch.lead_time
                 events.append(
                     _Event(time=time, signal=switch.signal, on=switch.on, step=steps[id(move)])

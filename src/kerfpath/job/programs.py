@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
+from kerfpath.execution import with_power
 from kerfpath.job.audit import Audit
 from kerfpath.job.audit_report import AuditReport
 from kerfpath.job.compensated import as_programmed, programmed
@@ -113,7 +114,7 @@ def program_of(
     chosen = options.robot_language
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
-    program = build_program(plans, options, moves=moves)
+    program = with_power(build_program(plans, options, moves=moves), options)
     if missing:
         lacks = f"Not cut, as no path was found: {', '.join(missing)}."
         program = replace(program, caveats=(lacks, *program.caveats))

@@ -52,6 +52,8 @@ from kerfpath.post.places import groups_of as groups_of
 from kerfpath.post.places import issue_lines as issue_lines
 from kerfpath.post.places import issues_before_planning as issues_before_planning
 from kerfpath.post.places import timed_lines as timed_lines
+from kerfpath.post.power import PowerBySpeed as PowerBySpeed
+from kerfpath.post.power import power_curve as power_curve
 from kerfpath.post.program import PARTNERS as PARTNERS
 from kerfpath.post.program import Await as Await
 from kerfpath.post.program import CircularMove as CircularMove
@@ -65,6 +67,7 @@ from kerfpath.post.program import Program as Program
 from kerfpath.post.program import ProgramIssue as ProgramIssue
 from kerfpath.post.program import Request as Request
 from kerfpath.post.program import Section as Section
+from kerfpath.post.program import SetPower as SetPower
 from kerfpath.post.program import Signal as Signal
 from kerfpath.post.program import Step as Step
 from kerfpath.post.program import Switch as Switch
@@ -78,6 +81,7 @@ from kerfpath.post.read_program import ReadLabel as ReadLabel
 from kerfpath.post.read_program import ReadMove as ReadMove
 from kerfpath.post.read_program import ReadOff as ReadOff
 from kerfpath.post.read_program import ReadPause as ReadPause
+from kerfpath.post.read_program import ReadPower as ReadPower
 from kerfpath.post.read_program import ReadProgram as ReadProgram
 from kerfpath.post.read_program import ReadSection as ReadSection
 from kerfpath.post.read_program import ReadStep as ReadStep

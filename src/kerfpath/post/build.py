@@ -25,6 +25,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    SetPower,
     Signal,
     Step,
     Switch,
@@ -269,7 +270,7 @@ def dry_run(program: Program, share: float) -> Program:
 
 
 def _slow_steps(section: Section, share: float) -> list[Step]:
-    left_out = Wait | Request | Await
+    left_out = Wait | SetPower | Request | Await
     return [_slow(step, share) for step in section.steps if not isinstance(step, left_out)]
 
 

@@ -32,6 +32,7 @@ from kerfpath.post.program import (
     ProgramIssue,
     Request,
     Section,
+    SetPower,
     Step,
     Wait,
     switches_of,
@@ -84,7 +85,7 @@ def preflight(
     settings = chosen.completed(settings)
     rules = chosen.rules(settings)
     for section in program.sections:
-        issues += _check_laser(section)
+        issues += [*_check_laser(section), *_check_power(section)]
         issues += _check_stays(section)
         issues += _check_motion(program, section, rules)
         issues += _check_limits(program, section)
@@ -128,6 +129,17 @@ def _check_outputs(
 ) -> Iterator[ProgramIssue]:
     """Check that there is an output for everything that is switched; warn of assumed ones."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
+    if "power" in program.signals and language.no_power:
+        message = f"{language.no_power}; leave power_by_speed out, or use another language"
+        yield ProgramIssue("error", "power", message, "program")
+        return
+    if getattr(settings, "power_output", None) is not None:
+        if settings.power_full is None:  # type: ignore[attr-defined]  # it goes with the output
+            message = f"say the value at full power with power_full in [program.{language.name}]"
+            yield ProgramIssue("error", "output", message, "program")
+        elif "power" not in program.signals:
+            message = "power_output is named, but stays 0: no power_by_speed says how it is set"
+            yield ProgramIssue("warning", "power", message, "program")
     for signal in sorted({*program.signals, *assumed}):
         key = f"{signal}_output"
         if key not in type(settings).model_fields or getattr(settings, key) is not None:
@@ -157,7 +169,9 @@ def _check_ports(
             )
             yield ProgramIssue("error", "handshake", message, "program")
     ports: list[tuple[str, str, object]] = [
-        (signal, "output", getattr(settings, f"{signal}_output", None)) for signal in SIGNALS
+        (signal, "output", getattr(settings, f"{signal}_output", None))
+        for signal in SIGNALS
+        if signal != "power"  # which is analogue
     ]
     ports += [(partner, way, port) for (partner, way), port in known.items()]
     taken: dict[tuple[str, object], str] = {}
@@ -252,6 +266,9 @@ def _check_stays(section: Section) -> Iterator[ProgramIssue]:
                 yield ProgramIssue("error", "wait", f"a wait must last {message}", place)
             if not stands:
                 yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
+        if isinstance(step, SetPower) and not (stands and 0 <= step.share <= 1):
+            message = "a power must be a share from 0 to 1, and follow a move that stops"
+            yield ProgramIssue("error", "power", message, place)
         if isinstance(step, Request | Await) and (on or not stands):
             message = "a handshake must follow a move that stops, with the laser off"
             yield ProgramIssue("error", "handshake", message, place)
@@ -274,6 +291,27 @@ def _check_laser(section: Section) -> Iterator[ProgramIssue]:
             on = switch.on if switch.signal == "laser" else on
     if on:
         yield ProgramIssue("error", "laser-order", "the laser is still on at the end", section.name)
+
+
+def _check_power(section: Section) -> Iterator[ProgramIssue]:
+    """Check that there is no power in joint moves and at the end, and that it is a share."""
+    share = 0.0
+    for index, step in enumerate(section.steps):
+        place = f"{section.name}, step {index}"
+        if isinstance(step, JointMove) and share > 0:
+            yield ProgramIssue("error", "power", "the power is on during a joint move", place)
+        share = step.share if isinstance(step, SetPower) else share
+        for switch in switches_of(step):
+            said = switch.share if switch.signal == "power" else None
+            if (said is None) == (switch.signal == "power"):
+                message = f"expected a share of the {switch.signal} if and only if it is the power"
+                yield ProgramIssue("error", "power", message, place)
+            elif said is not None and (not 0 <= said <= 1 or switch.on != (said > 0)):
+                message = f"expected a share of the power from 0 to 1, on above 0, got {said:g}"
+                yield ProgramIssue("error", "power", message, place)
+            share = share if said is None else said
+    if share > 0:
+        yield ProgramIssue("error", "power", "the power is still on at the end", section.name)
 
 
 def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[ProgramIssue]:

@@ -27,11 +27,19 @@ from kerfpath.post.program import (
     Program,
     ProgramIssue,
     Request,
+    SetPower,
     Switch,
     Wait,
     switches_of,
 )
-from kerfpath.post.read_program import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
+from kerfpath.post.read_program import (
+    ReadHandshake,
+    ReadMove,
+    ReadPower,
+    ReadProgram,
+    ReadStep,
+    ReadWait,
+)
 from kerfpath.robots import ExternalAxis, Robot
 
 # -----------------------------------------------------------------------------
@@ -52,6 +60,8 @@ DERIVED = np.radians(1.0)
 pose, near a singularity. Another posture is farther off."""
 REACH = 4.0
 """Distance (m) that no tip has from an axis: the lever arm of rounding errors of joints."""
+POWER = 2e-3
+"""Largest difference of shares of the full power: the digits of an analogue output."""
 SHARE = 6e-3
 """Largest difference of shares of the full speed: controllers count per cent."""
 
@@ -217,7 +227,7 @@ class Difference:
     ----------
     code : str
         frames, added, removed, order, targets, joints, external, kinds, speeds, times, zones,
-        switches, waits, postures or handshakes.
+        switches, waits, postures, handshakes or power.
     count : int
         Number of contours or moves that differ.
     message : str
@@ -332,6 +342,7 @@ def differences(
     if strict:
         found += _find_given_once(both, names)
     found += _compare_handshakes([(one[i], two[j]) for i, j in same], names)
+    found += _compare_powers([(one[i], two[j]) for i, j in same], names)
     return found
 
 
@@ -569,6 +580,26 @@ def _compare_handshakes(
         )
 
 
+def _compare_powers(
+    groups: Sequence[tuple[ReadGroup, ReadGroup]], names: Names
+) -> Iterator[Difference]:
+    """Compare the power that is set while the robot stands."""
+    for a, b in groups:
+        one, two = ([(k, power.share) for k, power in group.powers] for group in (a, b))
+        same = len(one) == len(two) and all(
+            k == j and abs(x - y) <= POWER for (k, x), (j, y) in zip(one, two, strict=True)
+        )
+        if not same:
+            shares = ([f"{share:.1%}" for _, share in each] for each in (one, two))
+            words = (", ".join(each) or "none" for each in shares)
+            said = " and ".join(f"{w} in {name}" for w, name in zip(words, names, strict=True))
+            there = [power.place for _, power in b.powers]
+            near = [move.place for move in (*b.path, *b.joint)]
+            message = f"set while the robot stands: {said}"
+            yield Difference(code="power", count=1, message=message, near=[*there, *near, ""][0])
+            return
+
+
 def _excess(one: float | None, two: float | None, allowed: float) -> float:
     """Return by how much two numbers differ beyond `allowed`; 0 if one is missing."""
     return 0.0 if one is None or two is None else max(abs(one - two) - allowed, 0.0)
@@ -609,6 +640,7 @@ def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
     ours, theirs = ([(s.signal, s.on, s.needs) for s in move.switches] for move in (a, b))
     return ours != theirs or any(
         abs(one.lead_time - two.lead_time) > digits.lead
+        or abs((one.share or 0.0) - (two.share or 0.0)) > POWER
         for one, two in zip(a.switches, b.switches, strict=True)
     )
 
@@ -646,6 +678,10 @@ def deviations(
         if isinstance(step, Wait) and isinstance(back, ReadWait):
             if abs(step.time - back.time) > LEAD:
                 issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
+        elif isinstance(step, SetPower) and isinstance(back, ReadPower):
+            if abs(step.share - back.share) > POWER:
+                message = f"the power is {back.share:.1%}, expected {step.share:.1%}"
+                issues.append(_issue(back, message))
         elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
             if step != back.what:
                 message = f"{handshake_in_words(back.what)}, expected {handshake_in_words(step)}"
@@ -680,6 +716,7 @@ def _kind(step: object) -> str:
         ("circular", CircularMove),
         ("linear", LinearMove),
         ("wait", Wait),
+        ("power", SetPower),
     )
     return next((word for word, kind in kinds if isinstance(step, kind)), "handshake")
 
@@ -687,7 +724,8 @@ def _kind(step: object) -> str:
 def _kind_read(back: ReadStep) -> str:
     if isinstance(back, ReadMove):
         return back.kind
-    return "wait" if isinstance(back, ReadWait) else "handshake"
+    kinds = (("wait", ReadWait), ("power", ReadPower))
+    return next((word for word, kind in kinds if isinstance(back, kind)), "handshake")
 
 
 def handshake_in_words(what: Handshake) -> str:
@@ -700,11 +738,16 @@ def handshake_in_words(what: Handshake) -> str:
 def switches_in_words(switches: Iterable[Switch]) -> str:
     """Return switches in words."""
     words = [
-        f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead"
+        f"{s.signal} {_state(s)} {s.lead_time:g} s ahead"
         + (f", only with {' and '.join(s.needs)}" if s.needs else "")
         for s in switches
     ]
     return " and ".join(words) or "nothing"
+
+
+def _state(switch: Switch) -> str:
+    """Return what a signal is switched to, in words."""
+    return ("on" if switch.on else "off") if switch.share is None else f"{switch.share:.1%}"
 
 
 def _joints_follow(back: ReadMove) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from kerfpath.errors import InputError
-from kerfpath.post.program import Await, ProgramIssue, Request
+from kerfpath.post.program import SIGNALS, Await, ProgramIssue, Request
 from kerfpath.post.read_program import (
     FlowStep,
     ReadEnd,
@@ -26,6 +26,7 @@ from kerfpath.post.read_program import (
     ReadMove,
     ReadOff,
     ReadPause,
+    ReadPower,
     ReadProgram,
     ReadSection,
     ReadStep,
@@ -38,11 +39,11 @@ from kerfpath.post.read_program import (
 State = frozenset[str]
 """The outputs that are on and the answers that were given."""
 ALL_OFF = State()
-LASER, ANSWER = "the laser", "the answer of "
+LASER, POWER, ANSWER = "the laser", "the power", "the answer of "
 
 
 def _output(name: str) -> str:
-    return LASER if name == "laser" else f"the output of {name}"
+    return {"laser": LASER, "power": POWER}.get(name, f"the output of {name}")
 
 
 class _Routine:
@@ -86,6 +87,8 @@ class _Routine:
                     yield late, state - {ANSWER + partner}
             case ReadHandshake(what=Request(partner=partner, on=True)):
                 yield at + 1, state | {_output(partner)}
+            case ReadPower(share=share):
+                yield at + 1, state | {POWER} if share > 0 else state - {POWER}
             case ReadHandshake(what=Request(partner=output)) | ReadOff(output=output):
                 yield at + 1, _switched_off(state, output)
             case _:
@@ -95,7 +98,7 @@ class _Routine:
 def _switched_off(state: State, output: str) -> State:
     """Return the state without an output; what partners answered to a request holds no longer."""
     state -= {_output(output)}
-    return state if output in ("laser", "gas") else _without_answers(state)
+    return state if output in SIGNALS else _without_answers(state)
 
 
 def _without_answers(state: State) -> State:
@@ -333,9 +336,11 @@ class _Machine:
 
 def _wrongs(step: FlowStep | None, state: State, planned: State) -> Iterator[str]:
     """Yield in words what is wrong with a step in a state; None is the end of a routine."""
+    if POWER in state and isinstance(step, ReadMove) and step.kind == "joint":
+        yield f"comes here with {POWER} on"
     on_path = isinstance(step, ReadMove) and step.kind != "joint"
     if LASER in state and not (
-        on_path or isinstance(step, ReadWait | ReadLabel | ReadJump | ReadOff)
+        on_path or isinstance(step, ReadWait | ReadPower | ReadLabel | ReadJump | ReadOff)
     ):
         yield f"comes here with {LASER} on"
     elif isinstance(step, ReadPause) or (isinstance(step, ReadEnd) and step.of_program):

@@ -33,6 +33,7 @@ from kerfpath.post.program import (
     ProgramIssue,
     Request,
     Section,
+    SetPower,
     Signal,
     Step,
     Switch,
@@ -208,6 +209,12 @@ OrientationSetting = Annotated[
     Orientation,
     setting("how the tool turns between targets: slerp, two-angle or wrist", '"slerp"'),
 ]
+
+PowerFull = Annotated[
+    float | None,
+    setting("the value of power_output at full power, above 0, at most 100000", "10", gt=0, le=1e5),
+]
+"""In the units of the output; none is assumed."""
 
 PositionerFrame = Annotated[
     Annotated[list[float], Field(min_length=6, max_length=6)] | None,
@@ -425,6 +432,16 @@ class Formatter(ABC):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield the lines of a wait."""
 
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield the lines that set the power where the robot stands.
+
+        Raises
+        ------
+        InputError
+            The language cannot set a power; the preflight reports that before.
+        """
+        raise InputError("the language cannot set a power; leave power_by_speed out of the job")
+
     def request(self, request: Request) -> Iterator[str]:
         """Yield the lines that set or reset the output of a partner.
 
@@ -479,6 +496,8 @@ class Formatter(ABC):
             yield from self.linear_move(step)
         elif isinstance(step, Wait):
             yield from self.wait(step)
+        elif isinstance(step, SetPower):
+            yield from self.power(step)
         elif isinstance(step, Request):
             yield from self.request(step)
         elif isinstance(step, Await):
@@ -513,6 +532,10 @@ class Formatter(ABC):
                 f"with {signal}_output"
             )
         return name
+
+    def power_value(self, share: float | None, decimals: int = 4) -> str:
+        """Return the value of the power output at a share of the full power."""
+        return number((share or 0.0) * self.settings.power_full, decimals)
 
     def needed(self, switch: Switch) -> list[Any]:
         """Return the outputs that must be on for a switch to act."""
@@ -695,6 +718,11 @@ class Language:
         Whether its moves are straight lines and arcs whose corners the controller rounds.
     assumed : mapping of str to value
         Values of settings that are None; the preflight warns of assumed outputs.
+    durations : callable, optional
+        (robot, q (m+1, n) rad, planned (m,) s, settings) -> how long moves take from stop to stop,
+        (m,) s. None: as `kerfpath.execution` models it.
+    no_power : str
+        Why programs cannot set the power along the path; empty if they can.
     externals : callable, optional
         (robot, settings) -> what is missing or wrong in the settings for the robot's external axes
         and coordinated motion, as sentences. None: the language has no external axes.
@@ -726,6 +754,8 @@ class Language:
     ahead: bool = True
     zones: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
+    no_power: str = ""
+    durations: Callable[[Robot, Array, Array, Any], Array] | None = None
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
     encodings: tuple[str, ...] = ("utf-8-sig",)
     byte_order_mark: bool = False

@@ -38,6 +38,7 @@ from kerfpath.post.read_program import (
     ReadMove,
     ReadOff,
     ReadPause,
+    ReadPower,
     ReadWait,
 )
 from kerfpath.robots import Robot
@@ -413,6 +414,41 @@ class LineReader:
     def wait_again(self, port: object) -> None:
         """Add a wait for an input without a limit."""
         self.expect_answer(port, math.inf)
+
+    # Power, by an analogue output.
+
+    def power(self, output: object, value: str) -> None:
+        """Add that the power is set while the robot stands."""
+        self.require_stopped("a power")
+        self.add(ReadPower, share=self.power_share(output, value))
+
+    def power_off(self, output: object) -> None:
+        """Add that the power is set to 0, whatever it is."""
+        self.require_power_output(output)
+        self.add(ReadOff, output="power")
+
+    def power_switch(self, output: object, value: str, lead_time: float = 0.0) -> Switch:
+        """Return the switch of the power to a value of its output."""
+        share = self.power_share(output, value)
+        return Switch(signal="power", on=share > 0, lead_time=lead_time, share=share)
+
+    def power_share(self, output: object, value: str) -> float:
+        """Return the share of the full power at a value of its output."""
+        self.require_power_output(output)
+        full = self.settings.power_full
+        if full is None:
+            raise self.fault("the power is set; say its value at full power with power_full")
+        share = float(value) / float(full)
+        if not 0 <= share <= 1 + 1e-9:
+            raise self.fault(f"expected a power from 0 to {full:g}, got {value}")
+        return share
+
+    def require_power_output(self, output: object) -> None:
+        """Refuse an analogue output that is not that of the power."""
+        expected = self.settings.power_output
+        if expected is None or output != expected:
+            named = "no analogue output" if expected is None else f"the output {expected}"
+            raise self.fault(f"expected {named} to be set, got {output}")
 
     def pause(self) -> None:
         """Add a pause, after which the operator may continue."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
 from kerfpath.post.arcs import Zone
 from kerfpath.post.languages import Language, LanguageSettings, Rules, language, plain
+from kerfpath.post.power import PowerBySpeed, PowerCurve, power_curve
 from kerfpath.post.program import Handshake
 from kerfpath.setting import check, documented, setting
 
@@ -30,6 +31,9 @@ class ProgramKeywords(TypedDict, total=False):
     thin_tolerance: float
     handshakes: Sequence[Handshake]
     remarks: Sequence[str]
+    power_by_speed: PowerCurve | None
+    power_step: float
+    pierce_power: float | None
 
 
 @documented
@@ -153,6 +157,31 @@ class ProgramOptions:
         example="0.02",
         key="thin_mm",
     )
+    power_by_speed: PowerCurve | None = setting(
+        None,
+        "the power by the speed that the tip really has: pairs of a share of the programmed speed "
+        "and a share of the full power, with straight lines between. None: no program sets the "
+        "power. See `kerfpath.execution.with_power`",
+        takes=list[list[float]],
+        what="pairs [share of the speed, share of the power] from speed 0 to 1",
+        example="[[0.0, 0.3], [1.0, 1.0]]",
+    )
+    power_step: float = setting(
+        0.1,
+        "step of the power, as a share of the full power; it may differ from `power_by_speed` by "
+        "three quarters of it",
+        above=0,
+        most=0.5,
+        example="0.1",
+    )
+    pierce_power: float | None = setting(
+        None,
+        "share of the full power while the beam pierces; none: that of the full speed",
+        above=0,
+        most=1,
+        what="a share of the full power above 0, at most 1",
+        example="0.6",
+    )
     handshakes: Sequence[Handshake] = setting(
         (),
         "handshakes before each contour, in order, with the tool backed off. Requests are "
@@ -170,6 +199,8 @@ class ProgramOptions:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.power_by_speed is not None:
+            object.__setattr__(self, "power_by_speed", power_curve(self.power_by_speed))
         if self.zone != "auto":
             object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
         object.__setattr__(self, "handshakes", tuple(self.handshakes))
@@ -184,6 +215,14 @@ class ProgramOptions:
     def language_settings(self) -> LanguageSettings:
         """The settings of the language, complete."""
         return self.robot_language.completed(self.settings)
+
+    @property
+    def power(self) -> PowerBySpeed | None:
+        """How the power follows the speed; None if no program sets it."""
+        if self.power_by_speed is None:
+            return None
+        law = PowerBySpeed(curve=self.power_by_speed, step=self.power_step)
+        return law if self.pierce_power is None else replace(law, pierce=self.pierce_power)
 
     @property
     def rules(self) -> Rules:

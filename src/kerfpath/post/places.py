@@ -26,10 +26,18 @@ from kerfpath.post.program import (
     ProgramIssue,
     Request,
     Section,
+    SetPower,
     Switch,
     Wait,
 )
-from kerfpath.post.read_program import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
+from kerfpath.post.read_program import (
+    ReadHandshake,
+    ReadMove,
+    ReadPower,
+    ReadProgram,
+    ReadStep,
+    ReadWait,
+)
 from kerfpath.robots import Robot
 
 # -----------------------------------------------------------------------------
@@ -117,6 +125,8 @@ class ReadGroup:
         After how many moves of the path the robot waits, and how long.
     handshakes : list of (int, ReadHandshake)
         After how many moves of the path a partner is asked or awaited.
+    powers : list of (int, ReadPower)
+        After how many moves of the path the power is set while the robot stands.
     """
 
     name: str = ""
@@ -124,6 +134,7 @@ class ReadGroup:
     path: list[ReadMove] = field(default_factory=list)
     waits: list[tuple[int, ReadWait]] = field(default_factory=list)
     handshakes: list[tuple[int, ReadHandshake]] = field(default_factory=list)
+    powers: list[tuple[int, ReadPower]] = field(default_factory=list)
 
     __repr__ = short_repr
 
@@ -147,6 +158,8 @@ def _add(group: ReadGroup, step: ReadStep) -> None:
         group.waits.append((len(group.path), step))
     elif isinstance(step, ReadHandshake):
         group.handshakes.append((len(group.path), step))
+    elif isinstance(step, ReadPower):
+        group.powers.append((len(group.path), step))
     elif step.kind == "joint":
         group.joint.append(step)
     else:
@@ -246,6 +259,7 @@ def _lines(program: Program, read: ReadProgram) -> list[Line | None]:
     kinds: tuple[tuple[Any, type], ...] = (
         (JointMove | LinearMove, ReadMove),
         (Wait, ReadWait),
+        (SetPower, ReadPower),
         (Request | Await, ReadHandshake),
     )
     for kind, read_kind in kinds:
@@ -296,6 +310,7 @@ def issues_before_planning(
         steps = (
             JointMove(q=q, speed=1.0),
             *options.handshakes,
+            *([] if options.power is None else [SetPower(share=0.0)]),
             LinearMove(
                 T_part_tip=here,
                 q=q,

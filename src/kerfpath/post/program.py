@@ -47,7 +47,7 @@ class ProgramIssue:
 # -----------------------------------------------------------------------------
 # The neutral program: the steps of the robot in order, before a language formats them.
 
-Signal = Literal["laser", "gas"]
+Signal = Literal["laser", "gas", "power"]
 SIGNALS: dict[str, Signal] = {word: word for word in get_args(Signal)}
 """Every signal by its name, for readers."""
 Partner = Literal["ready", "shutter", "gas_pressure", "height", "interlock"]
@@ -61,20 +61,23 @@ class Switch:
 
     Parameters
     ----------
-    signal : {"laser", "gas"}
-        What is switched; the settings of a language name its output.
+    signal : {"laser", "gas", "power"}
+        What is switched; the settings of a language name its output. That of the power is analogue.
     on : bool
     lead_time : float s
         Time before the tip arrives there; it compensates for the delay of output and source.
     needs : tuple of {"gas", "ready", "shutter", "height"}
         Outputs, of the gas or of requests to partners, without which it stays off. After a stop
         they may be off. Only where the robot stops, without a lead time.
+    share : float or None
+        Of the power alone: its share of the full power from there on.
     """
 
     signal: Signal
     on: bool
     lead_time: float = 0.0
     needs: tuple[Signal | Partner, ...] = ()
+    share: float | None = None
 
     __repr__ = short_repr
 
@@ -176,6 +179,21 @@ class Wait:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetPower:
+    """Set the power where the robot stands.
+
+    Parameters
+    ----------
+    share : float
+        Share of the full power, from 0 to 1.
+    """
+
+    share: float
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """Set or reset the output that asks a partner for something; the robot is stopped.
 
@@ -271,7 +289,7 @@ def asked_in(steps: Iterable[Step]) -> Iterator[Handshake | None]:
 PathMove = LinearMove | CircularMove
 Move = JointMove | LinearMove | CircularMove
 Handshake = Request | Await
-Step = Move | Wait | Handshake | Comment
+Step = Move | Wait | SetPower | Handshake | Comment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -335,8 +353,10 @@ class Program:
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Signals that are switched anywhere in the program."""
-        return tuple(sorted({switch.signal for move in self.moves for switch in switches_of(move)}))
+        """Signals that are switched or set anywhere in the program."""
+        found = {switch.signal for move in self.moves for switch in switches_of(move)}
+        found |= {SIGNALS["power"] for step in self.steps if isinstance(step, SetPower)}
+        return tuple(sorted(found))
 
     @property
     def moves(self) -> tuple[Move, ...]:

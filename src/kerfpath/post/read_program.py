@@ -119,7 +119,16 @@ class ReadHandshake(_InFile):
     __repr__ = short_repr
 
 
-ReadStep = ReadMove | ReadWait | ReadHandshake
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadPower(_InFile):
+    """The power is set to a share of the full power while the robot is stopped."""
+
+    share: float
+
+    __repr__ = short_repr
+
+
+ReadStep = ReadMove | ReadWait | ReadPower | ReadHandshake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from kerfpath.report.maps import feasibility_map, hidden_postures, shown_posture
 from kerfpath.report.motion import plot
 from kerfpath.report.page import render_table, with_library, without_library
 from kerfpath.report.plan import render
+from kerfpath.report.power import PowerPath
 from kerfpath.report.section import ContourSection, add_clearance
 from kerfpath.report.style import reason_colours
 
@@ -25,6 +26,7 @@ __all__ = [
     "FrontAxis",
     "FrontPlan",
     "LayoutEntry",
+    "PowerPath",
     "add_clearance",
     "feasibility_map",
     "hidden_postures",

@@ -18,6 +18,7 @@ from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
 from kerfpath.report.executed import ExecutedPath
+from kerfpath.report.power import PowerPath
 
 SPARE = (0.25, 0.5, 1.0)
 """Upper ends of the ranges of clearance that have colours, as shares of the map's band."""
@@ -78,6 +79,8 @@ class ContourSection:
         Sampling errors of the nodes, in rows such as ("Chord error", "0.01 mm").
     executed : ExecutedPath, optional
         The path as it is executed.
+    power : PowerPath, optional
+        The power along it, if the program sets it.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class ContourSection:
     clearance: ClearanceMap | None = None
     sampling: Sequence[tuple[str, str]] = ()
     executed: ExecutedPath | None = None
+    power: PowerPath | None = None
 
     __repr__ = short_repr
 

@@ -42,6 +42,7 @@ DIFFER = "ROWS DIFFER: stop in between"
 SHEET = {
     "stand_off_mm": "stand-off {:g} mm",
     "power_w": "power {:g} W",
+    "power_by_speed": "power by speed {}",
     "frequency_hz": "frequency {:g} Hz",
     "duty_percent": "duty {:g} %",
     "pressure_bar": "gas pressure {:g} bar",
@@ -115,9 +116,11 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
     if faults:
         raise all_of(faults)
     rows = list(chosen.values())
-    once = {"pierce_time_s": [row.pierce_time for row in rows]}
-    if _switches_gas(source):
+    once: dict[str, Sequence[Any]] = {"pierce_time_s": [row.pierce_time for row in rows]}
+    if _names(source, "gas_output"):
         once["gas_lead_s"] = [row.gas_lead_s for row in rows]
+    if _names(source, "power_output"):
+        once["power_by_speed"] = [row.power_by_speed for row in rows]
     program = _once(path, source, "program", once)
     cell = source.get("cell")
     if isinstance(cell, dict):
@@ -147,17 +150,17 @@ def _filled(contour: Mapping[str, Any], row: RowTable) -> dict[str, Any]:
     return table
 
 
-def _switches_gas(source: Mapping[str, Any]) -> bool:
-    """Return whether the job names an output for the gas in the language of its program."""
+def _names(source: Mapping[str, Any], output: str) -> bool:
+    """Return whether the job names an output in the language of its program."""
     program = source.get("program")
     if not isinstance(program, dict):
         return False
     table = program.get(str(program.get("language", ProgramOptions().language)))
-    return isinstance(table, dict) and "gas_output" in table
+    return isinstance(table, dict) and output in table
 
 
 def _once(
-    path: Path, source: Mapping[str, Any], name: str, values: Mapping[str, Sequence[float | None]]
+    path: Path, source: Mapping[str, Any], name: str, values: Mapping[str, Sequence[Any]]
 ) -> Any:
     """Return a table of the job with values that all rows in use have alike."""
     table = source.get(name, {})
@@ -167,12 +170,15 @@ def _once(
     for key, each in values.items():
         if key in table or all(value is None for value in each):
             continue
-        if len(set(each)) > 1:
-            got = " and ".join(f"{value or 0:g}" for value in dict.fromkeys(each))
-            unit = key.rpartition("_")[2]
+        distinct = [value for k, value in enumerate(each) if value not in each[:k]]
+        if len(distinct) > 1:
+            number = isinstance(distinct[-1] or distinct[0], float)
+            unit = f" {key.rpartition('_')[2]}" if number else ""
+            words = (f"{value or 0:g}" if number else f"{value or 'none'}" for value in distinct)
+            got = " and ".join(words) + unit
             said = (
-                f"expected one {key} of [{name}] for all contours, got {got} {unit} from the rows "
-                f"of their techniques; write {key} in [{name}]"
+                f"expected one {key} of [{name}] for all contours, got {got} from the rows of "
+                f"their techniques; write {key} in [{name}]"
             )
             raise refusal_at(path, ("process", "technique"), said)
         found[key] = each[0]
@@ -216,6 +222,8 @@ def by_hand(
     said = {"stand_off_mm": (source.get("cell") or {}).get("stand_off_mm", row.stand_off_mm)}
     if "gas_lead_s" in source.get("program", {}):
         said["gas_lead_s"] = None  # the program switches the gas
+    if "power_by_speed" in source.get("program", {}):
+        said["power_by_speed"] = None  # the program sets the power
     for key, words in SHEET.items():
         value = said.get(key, getattr(row, key))
         if value is not None:

@@ -7,6 +7,7 @@ from kerfpath.job.output.writing import ProgramPlaces as ProgramPlaces
 from kerfpath.job.output.writing import WrittenFiles as WrittenFiles
 from kerfpath.job.output.writing import make_folder as make_folder
 from kerfpath.job.output.writing import plan_file_text as plan_file_text
+from kerfpath.job.output.writing import power_of as power_of
 from kerfpath.job.output.writing import process_times as process_times
 from kerfpath.job.output.writing import program_places as program_places
 from kerfpath.job.output.writing import program_texts as program_texts

@@ -14,10 +14,11 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
+from kerfpath.execution import PowerAlong, power_along, with_power
 from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
-from kerfpath.job.compensated import compensation_notes
+from kerfpath.job.compensated import compensation_notes, programmed
 from kerfpath.job.format import DIFFER, Job, origins_of, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
@@ -43,7 +44,7 @@ from kerfpath.post import (
     replace_program,
     timed_lines,
 )
-from kerfpath.report import ContourSection, ExecutedPath, render
+from kerfpath.report import ContourSection, ExecutedPath, PowerPath, render
 from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
 from kerfpath.transfer import TransferMove
@@ -85,6 +86,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
         return ProgramPlaces()
     try:
         program = build_program(outcome.programmed, options, moves=outcome.moves)
+        program = with_power(program, options)
         issues = preflight(program, options.language, options.settings)
     except InputError:  # reported when the program is written
         return ProgramPlaces()
@@ -120,6 +122,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             clearance=cut.clearance,
             sampling=() if cut.departure is None else _sampling(cut.departure),
             executed=_executed(job, cut),
+            power=_power(job, cut),
         )
         for cut in outcome.cuts
     ]
@@ -248,6 +251,34 @@ def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
         allowed=allowed_off(job),
         facts=tuple(facts),
     )
+
+
+def _power(job: Job, cut: CutResult) -> PowerPath | None:
+    """Return the power along a cut; None if no program sets it."""
+    along = power_of(job, cut)
+    if along is None:
+        return None
+    least, most = along.set.min(), along.set.max()
+    facts = (
+        ("Power", f"{least:.0%} to {most:.0%} of the full power"),
+        ("Changes", str(along.switches)),
+        ("Off the power by the speed", f"at most {along.difference:.1%}"),
+    )
+    return PowerPath(s=along.s, speed=along.speed, asked=along.asked, set=along.set, facts=facts)
+
+
+def power_of(job: Job, cut: CutResult) -> PowerAlong | None:
+    """Return the power along a cut as the program sets it; None without a plan, or if it does not.
+
+    It is None, too, if the program cannot be made, which is reported when it is written.
+    """
+    if cut.plan is None or job.program.power is None or job.program.language == "none":
+        return None
+    try:
+        program = build_program([programmed(job, cut.plan, cut.as_run)], job.program)
+        return power_along(program, program.sections[0], job.program)
+    except InputError:
+        return None
 
 
 def _by_configuration(robot: Robot) -> Iterator[tuple[str, str]]:

@@ -15,13 +15,14 @@ from kerfpath.post.csv.writer import POSE, CsvSettings, columns
 from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import LineReader, program_lines
 from kerfpath.post.program import SIGNALS, Switch
-from kerfpath.post.read_program import MOVE_KINDS, FlowStep, ReadProgram
+from kerfpath.post.read_program import MOVE_KINDS, FlowStep, ReadPower, ReadProgram
 from kerfpath.robots import Robot
 
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
-_EVENT = re.compile(r"(laser|gas) (on|off) (\d+\.\d+) s ahead", re.ASCII)
+_EVENT = re.compile(r"(?:(laser|gas) (on|off)|power (\d\.\d+)) (\d+\.\d+) s ahead", re.ASCII)
+_POWER = re.compile(r"power (\d\.\d+)", re.ASCII)
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
-_KINDS = (*MOVE_KINDS, "via", "wait")
+_KINDS = (*MOVE_KINDS, "via", "wait", "power")
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
@@ -79,9 +80,15 @@ class _Reader(LineReader):
             "circular": [share],
             "via": [time, speed, share, zone, events],
             "wait": rest,
+            "power": [time, *rest[:-1]],
         }[kind]
         if any(empty):
             raise self.fault(f"a row of kind {kind} must not have the value {max(empty)[:40]!r}")
+        if kind == "power":
+            if (match := _POWER.fullmatch(events)) is None:
+                raise self.fault(f"expected a power, got {events[:40]!r}")
+            self.add(ReadPower, share=self.share(match[1]))
+            return
         if kind == "via":
             self.via = self.target(target)[1]
             return
@@ -124,10 +131,20 @@ class _Reader(LineReader):
         for words in text.split(" and ") if text else ():
             if (match := _EVENT.fullmatch(words)) is None:
                 raise self.fault(f"not an event: {words[:40]!r}")
-            signal, state, lead = match.groups()
-            on = state == "on"
-            found.append(Switch(signal=SIGNALS[signal], on=on, lead_time=float(lead)))
+            signal, state, power, lead = match.groups()
+            if power is None:
+                on = state == "on"
+                found.append(Switch(signal=SIGNALS[signal], on=on, lead_time=float(lead)))
+                continue
+            share = self.share(power)
+            found.append(Switch(signal="power", on=share > 0, lead_time=float(lead), share=share))
         return tuple(found)
+
+    def share(self, text: str) -> float:
+        """Return a share of the full power."""
+        if float(text) > 1:
+            raise self.fault(f"expected a power of at most 1, got {text}")
+        return float(text)
 
     def numbers(self, fields: list[str]) -> Array:
         for field in fields:

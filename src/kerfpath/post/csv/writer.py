@@ -27,6 +27,7 @@ from kerfpath.post.program import (
     JointMove,
     LinearMove,
     Move,
+    SetPower,
     Switch,
     Wait,
     targets_of,
@@ -63,7 +64,7 @@ def columns(robot: Robot) -> list[str]:
 
 def event(switch: Switch) -> str:
     """Return a switch in words."""
-    state = "on" if switch.on else "off"
+    state = ("on" if switch.on else "off") if switch.share is None else number(switch.share, 4)
     return f"{switch.signal} {state} {number(switch.lead_time, 4)} s ahead"
 
 
@@ -103,6 +104,11 @@ class Csv(Formatter):
         """Yield the row of a wait, which only contains its end."""
         fields = self.program.robot.joints + len(POSE) + 4
         yield f"wait,{next(self._ends)}{',' * fields}"
+
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield the row of a power that is set while the robot stands, in the last column."""
+        fields = self.program.robot.joints + len(POSE) + 4
+        yield f"power{',' * (fields + 1)}power {number(power.share, 4)}"
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield nothing: a table has no comments."""

@@ -27,6 +27,7 @@ from kerfpath.post.languages import (
     OrientationSetting,
     OverrideSetting,
     PortSettings,
+    PowerFull,
     Rules,
     ShortestMove,
     number,
@@ -61,6 +62,7 @@ WORDS = (
 
 Output = Annotated[int | None, numbered("a digital output", 4096)]
 Input = Annotated[int | None, numbered("a digital input", 4096)]
+Analogue = Annotated[int | None, numbered("an analogue output", 4096)]
 
 
 class FanucSettings(PortSettings, output=Output, input=Input):
@@ -69,6 +71,8 @@ class FanucSettings(PortSettings, output=Output, input=Input):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
+    power_output: Analogue = None
+    power_full: PowerFull = None
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d\d-\d\d-\d\d \d\d:\d\d:\d\d$")],
         setting("a date as YY-MM-DD hh:mm:ss", '"26-11-21 10:00:00"'),

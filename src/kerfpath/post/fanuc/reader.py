@@ -92,13 +92,13 @@ def _time_early(
 
 _NUMBER = r"(-?\d*\.\d+)"
 _END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?( COORD)?(?: ACC100)?"
-_TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
-_SWITCH = re.compile(r" ?TB *(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)", re.ASCII)
+_TB = r"((?: TB +\d*\.\d\dsec,(?:DO\[\d+\]=O(?:N|FF)|AO\[\d+\]=\d+))*)"
+_SWITCH = re.compile(r" ?TB *(\d*\.\d\d)sec,([DA])O\[(\d+)\]=(ON|OFF|\d+)", re.ASCII)
 _MAIN = patterns(
     {
         "frame_value": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
         "remark": r"  !.*",
-        "opening": r"  ((?:UFRAME_NUM|UTOOL_NUM|DO|OVERRIDE)\b.*)",
+        "opening": r"  ((?:UFRAME_NUM|UTOOL_NUM|DO|AO|OVERRIDE)\b.*)",
         "call": r"  CALL ([A-Z][A-Z0-9_]*)",
     }
 )
@@ -110,6 +110,7 @@ _SECTION = patterns(
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
         "switch": r"  DO\[(\d+)\]=(ON|OFF)",
+        "set_power": r"  AO\[(\d+)\]=(\d+)",
         "guarded": r"  IF \((DO\[\d+\](?: AND DO\[\d+\])*)\),DO\[(\d+)\]=\(ON\)",
         "timeout": r"  \$WAITTMOUT=(\d+)",
         "answer": r"  WAIT DI\[(\d+)\]=ON TIMEOUT,LBL\[1\]",
@@ -120,6 +121,7 @@ _WITHOUT_ANSWER = patterns(
     {
         "label": r"  LBL\[(\d+)\]",
         "off": r"  DO\[(\d+)\]=OFF",
+        "power_off": r"  AO\[(\d+)\]=0",
         "end_program": "  ABORT",
     }
 )
@@ -256,7 +258,9 @@ class _Section(Listing):
     ) -> None:
         switches = tuple(
             Switch(signal=self.signal(int(output)), on=value == "ON", lead_time=float(lead))
-            for lead, output, value in _SWITCH.findall(before)
+            if sort == "D"
+            else self.power_switch(int(output), value, float(lead))
+            for lead, sort, output, value in _SWITCH.findall(before)
         )
         if self.pending and (kind == "joint" or not self.steps):
             raise self.fault("an output must not be switched before this motion")
@@ -279,6 +283,11 @@ class _Section(Listing):
         if last is None or last.zone != 0:
             raise self.fault("an output may only be switched here after a path motion with FINE")
         self.add_switch(last, switch, self.place)
+
+    def set_power(self, output: str, value: str) -> None:
+        if self.pending:
+            raise self.fault("a power must not be set between an output and its motion")
+        self.power(int(output), value)
 
     def guarded(self, needed: str, output: str) -> None:
         self.require_output(int(output), self.settings.laser_output)

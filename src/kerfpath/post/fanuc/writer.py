@@ -48,6 +48,7 @@ from kerfpath.post.program import (
     ProgramIssue,
     Request,
     Section,
+    SetPower,
     Switch,
     Wait,
     targets_of,
@@ -215,7 +216,8 @@ def opening_lines(settings: FanucSettings) -> list[str]:
 
 def switch_off_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that switch everything off."""
-    return [f"  DO[{output}]=OFF ;" for output in outputs(settings)]
+    power = [] if settings.power_output is None else [f"  AO[{settings.power_output}]=0 ;"]
+    return [*(f"  DO[{output}]=OFF ;" for output in outputs(settings)), *power]
 
 
 def abort_lines(settings: FanucSettings) -> list[str]:
@@ -225,7 +227,9 @@ def abort_lines(settings: FanucSettings) -> list[str]:
 
 def watch_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that background logic runs: all is off while no program runs (UO[3])."""
-    off = (f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings))
+    off = [f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings)]
+    if settings.power_output is not None:
+        off.append(f"  IF (!UO[3]),AO[{settings.power_output}]=(0) ;")
     return ["  ! Run this as BG logic (SETUP) ;", *off]
 
 
@@ -298,6 +302,10 @@ class Fanuc(CalledFormatter):
         """Yield a WAIT."""
         yield f"  WAIT {_seconds(wait.time)}(sec) ;"
 
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield an analogue output; the robot is stopped."""
+        yield f"  AO[{self.output('power')}]={self.power_value(power.share, 0)} ;"
+
     def request(self, request: Request) -> Iterator[str]:
         """Yield an output; the robot is stopped."""
         yield f"  DO[{self.port(request.partner, 'output')}]={'ON' if request.on else 'OFF'} ;"
@@ -334,6 +342,8 @@ class Fanuc(CalledFormatter):
 
     def _set(self, switch: Switch) -> str:
         output, state = self.output(switch.signal), "ON" if switch.on else "OFF"
+        if switch.signal == "power":
+            return f"AO[{output}]={self.power_value(switch.share, 0)}"
         needed = " AND ".join(f"DO[{port}]" for port in self.needed(switch))
         return f"IF ({needed}),DO[{output}]=({state})" if needed else f"DO[{output}]={state}"
 

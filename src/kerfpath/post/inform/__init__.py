@@ -39,6 +39,7 @@ INFORM = Language(
     encodings=("utf-8-sig", "cp932", "cp1252"),
     longest_line=250,
     inherited=inherited,
+    no_power="INFORM switches outputs only where the robot stands, so no power follows the speed",
     read=read,
 )
 """The language as registered."""

@@ -30,6 +30,7 @@ from kerfpath.post.languages import (
     OverrideSetting,
     PortSettings,
     PositionerFrame,
+    PowerFull,
     Rules,
     ShortestMove,
     number,
@@ -128,6 +129,8 @@ RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 Output = Annotated[int | None, numbered("a digital output", 8192)]
 Input = Annotated[int | None, numbered("a digital input", 8192)]
 
+Analogue = Annotated[int | None, numbered("an analogue output", 32)]
+
 Number = Annotated[int, Field(ge=1, le=6)]
 Numbers = Annotated[
     Annotated[list[Number], Field(min_length=1, max_length=MOST_EXTERNAL)] | None,
@@ -139,6 +142,8 @@ class KrlSettings(PortSettings, output=Output, input=Input):
     """Outputs, inputs, tool and base, and limits of the machine data."""
 
     lines_per_file: LinesPerFile = 1400
+    power_output: Analogue = None
+    power_full: PowerFull = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None

@@ -52,6 +52,8 @@ _LINES = patterns(
         "zone": rf"\$APO\.CDIS={_NUMBER}",
         "share": r"BAS\(#VEL_PTP,(\d+)\)",
         "trigger": r"TRIGGER WHEN PATH=0 DELAY=(-?\d+) DO \$OUT\[(\d+)\]=(TRUE|FALSE)",
+        "power_trigger": r"TRIGGER WHEN PATH=0 DELAY=(-?\d+) DO \$ANOUT\[(\d+)\]=(\d+\.?\d*)",
+        "set_power": r"\$ANOUT\[(\d+)\]=(\d+\.?\d*)",
         "wait": rf"WAIT SEC {_NUMBER}",
         "condition": rf"IF ({FIRST}|{PASSED})<=(\d+) THEN",
         "call": rf"{_NAME}\((|{FIRST})\)",
@@ -75,7 +77,8 @@ _IN_FIRST = only(_LINES, "condition", "call", "end_condition", "timer", "end")
 _IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
-    "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
+    "linear", "speed", "zone", "trigger", "power_trigger", "circular", "joint", "share", "wait",
+    "set_power", "request",
     "guarded", "wait_for", "timer", "end",
 )  # fmt: skip
 _WITHOUT_ANSWER = patterns(
@@ -83,6 +86,7 @@ _WITHOUT_ANSWER = patterns(
         "": r"\$TIMER_STOP\[\d+\]=(?:TRUE|FALSE)|WAIT FOR \$IN\[\d+\] OR \$TIMER_FLAG\[\d+\]",
         "while_off": r"WHILE NOT \$IN\[(\d+)\]",
         "off": r"\$OUT\[(\d+)\]=FALSE",
+        "power_off": r"\$ANOUT\[(\d+)\]=0",
         "pause": "HALT",
         "ask_again": r"\$OUT\[(\d+)\]=TRUE",
         "wait_again": r"WAIT FOR \$IN\[(\d+)\]",
@@ -176,7 +180,7 @@ class _File(LineReader):
         return _IN_MAIN if self.is_main else _IN_FIRST
 
     def admit(self, kind: str) -> None:
-        if self.switches and kind not in {"linear", "circular", "trigger"}:
+        if self.switches and kind not in {"linear", "circular", "trigger", "power_trigger"}:
             raise self.fault("a trigger must come right before its motion")
 
     def require_data(self, others: list[str]) -> int:
@@ -330,12 +334,22 @@ class _File(LineReader):
         self.held[what], self.held_at[what] = value, self.place
 
     def trigger(self, delay_ms: str, output: str, state: str) -> None:
+        lead = self.lead_of(delay_ms)
+        switch = Switch(signal=self.signal(int(output)), on=state == "TRUE", lead_time=lead)
+        self.switches += (switch,)
+
+    def power_trigger(self, delay_ms: str, output: str, value: str) -> None:
+        self.switches += (self.power_switch(int(output), value, self.lead_of(delay_ms)),)
+
+    def set_power(self, output: str, value: str) -> None:
+        self.power(int(output), value)
+
+    def lead_of(self, delay_ms: str) -> float:
+        """Return the lead time (s) of a trigger."""
         if int(delay_ms) > 0:
             raise self.fault("a trigger must not have a positive DELAY")
         self.held_at.setdefault("switches", self.place)
-        lead = -int(delay_ms) * 1e-3
-        switch = Switch(signal=self.signal(int(output)), on=state == "TRUE", lead_time=lead)
-        self.switches += (switch,)
+        return -int(delay_ms) * 1e-3
 
     def joint(self, *fields: str) -> None:
         *axes_deg, external = fields

@@ -51,6 +51,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    SetPower,
     Wait,
     targets_of,
 )
@@ -90,7 +91,8 @@ def opening_lines(settings: KrlSettings) -> list[str]:
 
 def switch_off_lines(settings: KrlSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
-    return [f"$OUT[{output}]=FALSE" for output in outputs(settings)]
+    power = [] if settings.power_output is None else [f"$ANOUT[{settings.power_output}]=0"]
+    return [*(f"$OUT[{output}]=FALSE" for output in outputs(settings)), *power]
 
 
 def wait_lines(awaited: Await, asked: Sequence[Handshake], settings: KrlSettings) -> list[str]:
@@ -208,6 +210,10 @@ class Krl(Formatter):
         """Yield a WAIT SEC."""
         yield f"WAIT SEC {number(wait.time, 3)}"
 
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield an assignment; the robot is stopped."""
+        yield f"$ANOUT[{self.output('power')}]={self.power_value(power.share, 5)}"
+
     def request(self, request: Request) -> Iterator[str]:
         """Yield an assignment; the robot is stopped."""
         state = "TRUE" if request.on else "FALSE"
@@ -229,8 +235,10 @@ class Krl(Formatter):
             if switch.needs:
                 continue
             ahead_ms, state = round(switch.lead_time * 1e3), "TRUE" if switch.on else "FALSE"
-            output = self.output(switch.signal)
-            yield f"TRIGGER WHEN PATH=0 DELAY={-ahead_ms} DO $OUT[{output}]={state}"
+            to = f"$OUT[{self.output(switch.signal)}]={state}"
+            if switch.signal == "power":
+                to = f"$ANOUT[{self.output('power')}]={self.power_value(switch.share, 5)}"
+            yield f"TRIGGER WHEN PATH=0 DELAY={-ahead_ms} DO {to}"
         yield f"{word} {self._target[move]}{' C_DIS' if move.zone > 0 else ''}"
         for switch in move.switches:
             if switch.needs:

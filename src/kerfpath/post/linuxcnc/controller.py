@@ -14,6 +14,7 @@ from kerfpath.post.languages import (
     LinesPerFile,
     OverrideSetting,
     PortSettings,
+    PowerFull,
     Rules,
     handshakes,
     setting,
@@ -33,14 +34,24 @@ OFFSETS = range(5381, 5391)
 PORTS = 16
 """Number of outputs, and of inputs; output n is read back at input `PORTS` + n."""
 
+ANALOGUE = 4
+"""Number of analogue outputs."""
+
 Output = Annotated[int | None, setting("a digital output from 0 to 15", "0", ge=0, le=PORTS - 1)]
 Input = Annotated[int | None, setting("a digital input from 0 to 15", "0", ge=0, le=PORTS - 1)]
+
+
+Analogue = Annotated[
+    int | None, setting("an analogue output from 0 to 3", "2", ge=0, le=ANALOGUE - 1)
+]
 
 
 class LinuxcncSettings(PortSettings, output=Output, input=Input):
     """Inputs and outputs of the controller, the tolerance of its corners, and the override."""
 
     lines_per_file: LinesPerFile = 1_000_000
+    power_output: Analogue = None
+    power_full: PowerFull = None
     tolerance_deg: Annotated[
         float, setting("a number from 0.0001 to 1, in deg", "0.01", ge=1e-4, le=1)
     ] = 0.01
@@ -223,17 +234,25 @@ def hal_lines(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
 
     An output that the settings name is on only while a program runs.
     """
-    named = {signal: getattr(settings, f"{signal}_output") for signal in SIGNALS}
+    named = {name: getattr(settings, f"{name}_output") for name in SIGNALS if name != "power"}
     named |= {p: port for (p, way), port in handshakes(settings).items() if way == "output"}
     gates = {port: name for name, port in named.items() if port is not None}
+    power = settings.power_output
+    analogue = (
+        "setp power-gate.in0 0",
+        f"net power-asked motion.analog-out-{power or 0:02d} => power-gate.in1",
+        "net power power-gate.out",
+    )
     yield from (
         "loadrt [KINS]KINEMATICS",
         "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD "
-        f"num_joints=[KINS]JOINTS num_dio={2 * PORTS} num_aio=4",
+        f"num_joints=[KINS]JOINTS num_dio={2 * PORTS} num_aio={ANALOGUE}",
         f"loadrt and2 names={','.join(f'{name}-gate' for name in gates.values())}",
+        *(["loadrt mux2 names=power-gate"] if power is not None else []),
         "addf motion-command-handler servo-thread",
         "addf motion-controller servo-thread",
         *(f"addf {name}-gate servo-thread" for name in gates.values()),
+        *(["addf power-gate servo-thread"] if power is not None else []),
     )
     for k in range(robot.joints):
         yield f"net joint-{k} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb"
@@ -243,8 +262,10 @@ def hal_lines(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
         yield f"net output-{port} motion.digital-out-{port:02d} => {back}{gate}"
     yield from (
         "net running halui.program.is-running => "
-        + " ".join(f"{name}-gate.in1" for name in gates.values()),
+        + " ".join(f"{name}-gate.in1" for name in gates.values())
+        + (" power-gate.sel" if power is not None else ""),
         *(f"net {name} {name}-gate.out" for name in gates.values()),
+        *(analogue if power is not None else ()),
         "net enable iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in",
         "net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared",
         "net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed",

@@ -114,6 +114,19 @@ def stretch_of(
     return stretch(moves, q, asked, robot, settings)
 
 
+def durations(robot: Robot, q: Array, planned: Array, settings: LinuxcncSettings) -> Array:
+    """Return how long moves take (m,) s through joints q (m+1, n) rad, from stop to stop.
+
+    A move ends where the next one begins. Those that go nowhere take their planned times (m,) s.
+    """
+    took = planned.copy()
+    goes = np.array([not goes_nowhere(way) for way in np.diff(q, axis=0)])
+    if goes.any():
+        run = stretch((), q[np.append(True, goes)], planned[goes], robot, settings)
+        took[goes] = np.diff(np.append(run.begin, run.time))
+    return took
+
+
 def stretch(
     moves: tuple[ReadMove, ...], q: Array, asked: Array, robot: Robot, settings: LinuxcncSettings
 ) -> Stretch:

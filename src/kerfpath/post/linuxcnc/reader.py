@@ -11,7 +11,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.post.build import from_controller_units
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern
-from kerfpath.post.languages import outputs, reset_lines
+from kerfpath.post.languages import reset_lines
 from kerfpath.post.line_reader import (
     END_OF_FILE,
     LineReader,
@@ -43,7 +43,7 @@ from kerfpath.post.linuxcnc.writer import (
     wait_lines,
 )
 from kerfpath.post.program import Switch
-from kerfpath.post.read_program import FlowStep, ReadProgram, ReadSection
+from kerfpath.post.read_program import FlowStep, ReadMove, ReadProgram, ReadSection
 from kerfpath.robots import Robot
 
 
@@ -84,6 +84,7 @@ _WITHOUT_ANSWER = patterns(
     {
         "": r"o<.*|M66 .*|\(MSG,.*\)",
         "off": r"M65 P(\d{1,2})",
+        "power_off": r"M68 E(\d) Q0",
         "end_program": "M2",
     },
     caseless=True,
@@ -100,6 +101,8 @@ def _steps(words: str) -> dict[str, LinePattern]:
             "path_mode": r"(G61\.1|G64 P.* Q0)",
             "switch_ahead": r"M(62|63) P(\d{1,2})",
             "switch_now": r"M(64|65) P(\d{1,2})",
+            "power_ahead": rf"M67 E(\d) Q{_NUMBER}",
+            "power_now": rf"M68 E(\d) Q{_NUMBER}",
             "guarded": rf"o<{GUARD}> call" + r" \[(\d{1,2})\]" * MOST_NEEDS,
             "wait": rf"G4 P{_NUMBER}",
             "wait_for": rf"o<{AWAIT}> call \[(\d{{1,2}})\] \[{_NUMBER}\]",
@@ -129,10 +132,10 @@ class _Reader(LineReader):
 
     def program(self) -> ReadProgram:
         self.expect(reset_lines(inherited(self.settings)))
-        self.expect(off_lines(outputs(self.settings)))
-        self.can_wait = self.same(self.text, wait_lines([])[0])
+        self.expect(off_lines(self.settings))
+        self.can_wait = self.same(self.text, wait_lines(self.settings)[0])
         if self.can_wait:
-            self.expect(wait_lines(outputs(self.settings)), _WITHOUT_ANSWER)
+            self.expect(wait_lines(self.settings), _WITHOUT_ANSWER)
         exits = {AWAIT: tuple(self.steps)}
         self.can_guard = self.same(self.text, guard_lines(0)[0])
         if self.can_guard:
@@ -218,6 +221,21 @@ class _Reader(LineReader):
         if move is None or (now and move.zone != 0):
             raise self.fault("a switch must follow a move of the path, which stops for M64 and M65")
         self.add_switch(move, Switch(signal=self.signal(port), on=on), self.place)
+
+    def power_ahead(self, output: str, value: str) -> None:
+        move = self.last_on_path()
+        if move is None:
+            raise self.fault("expected M68 here: M67 sets a power as the path goes on")
+        self.add_switch(move, self.power_switch(int(output), value), self.place)
+
+    def power_now(self, output: str, value: str) -> None:
+        last = [step for step in self.steps if isinstance(step, ReadMove)][-1:]
+        if last and last[0].zone != 0:
+            raise self.fault("expected M67 here: M68 does not wait for the end of the move")
+        self.power(int(output), value)
+
+    def power_off(self, output: object) -> None:
+        super().power_off(int(str(output)))
 
     def guarded(self, *ports: str) -> None:
         if not self.can_guard:

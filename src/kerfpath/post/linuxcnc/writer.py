@@ -6,7 +6,7 @@ is the inverse of the time of a move (G93). A move that ends with a stop has G61
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 
@@ -45,6 +45,7 @@ from kerfpath.post.program import (
     Move,
     Request,
     Section,
+    SetPower,
     Switch,
     Wait,
     switches_of,
@@ -65,21 +66,22 @@ def blend_line(settings: LinuxcncSettings) -> str:
     return f"G64 P{settings.tolerance_deg:g} Q0"
 
 
-def off_lines(outputs: Sequence[int]) -> list[str]:
-    """Return the lines that switch outputs off."""
-    return [f"M65 P{output}" for output in outputs]
+def off_lines(settings: LinuxcncSettings) -> list[str]:
+    """Return the lines that switch everything off that the settings name."""
+    power = [] if settings.power_output is None else [f"M68 E{settings.power_output} Q0"]
+    return [*(f"M65 P{output}" for output in outputs(settings)), *power]
 
 
-def wait_lines(outputs: Sequence[int]) -> list[str]:
+def wait_lines(settings: LinuxcncSettings) -> list[str]:
     """Return the lines of the routine that waits for an input.
 
-    Without an answer all `outputs` are switched off and the program ends.
+    Without an answer everything is switched off and the program ends.
     """
     return [
         f"o<{AWAIT}> sub",
         "M66 P#1 L3 Q#2",
         "o<late> if [#5399 LT 0]",
-        *(f"  {line}" for line in off_lines(outputs)),
+        *(f"  {line}" for line in off_lines(settings)),
         "  (MSG,no answer at an input)",
         "  M2",
         "o<late> endif",
@@ -137,9 +139,9 @@ class Linuxcnc(Formatter):
         yield "; The HAL switches outputs off while no program runs; the safety circuit of the cell"
         yield "; has to switch the laser off, too."
         yield from reset_lines(inherited(self.settings))
-        yield from off_lines(outputs(self.settings))
+        yield from off_lines(self.settings)
         if any(isinstance(step, Await) for step in program.steps):
-            yield from wait_lines(outputs(self.settings))
+            yield from wait_lines(self.settings)
         if any(switch.needs for move in program.moves for switch in switches_of(move)):
             yield from guard_lines(self.output("laser"))
         for section in program.sections:
@@ -188,6 +190,13 @@ class Linuxcnc(Formatter):
         """Yield a dwell."""
         yield f"G4 P{number(wait.time, 4)}"
 
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield an analogue output; the robot is stopped."""
+        yield f"M68 {self._power(power.share)}"
+
+    def _power(self, share: float | None) -> str:
+        return f"E{self.output('power')} Q{self.power_value(share)}"
+
     def request(self, request: Request) -> Iterator[str]:
         """Yield an output; the robot is stopped."""
         yield f"M{64 if request.on else 65} P{self.port(request.partner, 'output')}"
@@ -206,6 +215,8 @@ class Linuxcnc(Formatter):
         if needed := [PORTS + port for port in self.needed(switch)]:
             ports = [*needed, *needed[-1:] * MOST_NEEDS][:MOST_NEEDS]
             return f"o<{GUARD}> call {' '.join(f'[{port}]' for port in ports)}"
+        if switch.signal == "power":
+            return f"M{68 if now else 67} {self._power(switch.share)}"
         return f"M{(64 if now else 62) + (not switch.on)} P{self.output(switch.signal)}"
 
     def _path_mode(self, move: Move) -> Iterator[str]:

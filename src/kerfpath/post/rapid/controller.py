@@ -27,6 +27,7 @@ from kerfpath.post.languages import (
     OrientationSetting,
     PortSettings,
     PositionerFrame,
+    PowerFull,
     Rules,
     ShortestMove,
     number,
@@ -135,6 +136,7 @@ PREDEFINED = re.compile(r"[vz]\d+|vmax|vrot\d+|vlin\d+", re.IGNORECASE)
 Name = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 Input = Annotated[Name | None, setting("the name of a digital input", '"diReady"')]
 Request = Annotated[Name | None, setting("the name of a digital output", '"doShutter"')]
+Analogue = Annotated[Name | None, setting("the name of an analogue output", '"aoPower"')]
 Units = Annotated[
     Annotated[list[Name], Field(min_length=1, max_length=MOST_EXTERNAL)] | None,
     setting("a list of mechanical units, one name for each external axis", '["TRACK_1", "STN_1"]'),
@@ -157,6 +159,8 @@ class RapidSettings(PortSettings, output=Request, input=Input):
     orientation: OrientationSetting = "slerp"
     shortest_move_ms: ShortestMove = None
     mechanical_units: Units = None
+    power_output: Analogue = None
+    power_full: PowerFull = None
     external_letters: Letters = None
     positioner_frame: PositionerFrame = None
 

@@ -106,6 +106,8 @@ _LINES = patterns(
         "guarded": rf"IF (DOutput\(\w+\)=1(?: AND DOutput\(\w+\)=1)*) SetDO {_NAME},1;",
         "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
+        "set_power_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\AOp:={_NAME},([\d.]+);",
+        "power": rf"SetAO {_NAME},([\d.]+);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
         "activate": rf"(Act|Deact)Unit {_NAME};",
@@ -130,6 +132,7 @@ IN_MAIN = only(
     _LINES,
     "activate",
     "set_trigger",
+    "set_power_trigger",
     "load",
     "condition",
     "late_call",
@@ -140,12 +143,13 @@ IN_MAIN = only(
 IN_ROUTINE = only(
     _LINES,
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "request", "guarded", "wait_for", "end_routine",
+    "request", "guarded", "wait_for", "power", "end_routine",
 )  # fmt: skip
 
 _ON_ERROR = patterns(
     {
         "off": r"SetDO (\w+),0;",
+        "power_off": r"SetAO (\w+),0;",
         "": rf"{SWITCH_OFF};|StopMove;|UNDO|ENDPROC|ERROR",
         "end_program": "RAISE;",
     },
@@ -355,14 +359,19 @@ class _Reader(Aggregates):
         self.expect_answer(name, float(timeout), otherwise=ERROR)
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
+        lead, on = float(lead_time), value == "1"
+        self.add_trigger(name, Switch(signal=self.signal(output), on=on, lead_time=lead))
+
+    def set_power_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
+        self.add_trigger(name, self.power_switch(output, value, float(lead_time)))
+
+    def add_trigger(self, name: str, switch: Switch) -> None:
         if self.called_in:
             raise self.fault("triggers must be set before the first contour is called")
         if name not in self.triggers or self.triggers[name] is not None:
             raise self.fault(f"{name} must be declared once and set once")
         self.said_at[name] = self.place
-        self.triggers[name] = Switch(
-            signal=self.signal(output), on=value == "1", lead_time=float(lead_time)
-        )
+        self.triggers[name] = switch
 
     def activate(self, state: str, unit: str) -> None:
         if (state == "Act") == bool(self.called_in):

@@ -37,6 +37,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    SetPower,
     Switch,
     Wait,
     switches_of,
@@ -93,7 +94,7 @@ class Rapid(Formatter):
         )
         switches = [s for m in moves for s in switches_of(m) if not s.needs]
         self.trigger: dict[Switch, str] = {}
-        for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
+        for signal, prefix in (("laser", "tr"), ("gas", "trGas"), ("power", "trPower")):
             for on, suffix in ((True, "On"), (False, "Off")):
                 keys = (s for s in switches if (s.signal, s.on) == (signal, on))
                 self.trigger |= _number_names(f"{prefix}{suffix}", keys)
@@ -179,18 +180,23 @@ class Rapid(Formatter):
         yield from self._units.activated()
         for s, name in self.trigger.items():
             lead = number(s.lead_time, 4)
-            yield rf"TriggIO {name},{lead}\Time\DOp:={self.output(s.signal)},{int(s.on)};"
+            to = rf"\DOp:={self.output(s.signal)},{int(s.on)}"
+            if s.signal == "power":
+                to = rf"\AOp:={self.output(s.signal)},{self.power_value(s.share)}"
+            yield rf"TriggIO {name},{lead}\Time{to};"
 
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the module, with what it names."""
         settings = self.settings
         gas, ports = settings.gas_output, handshakes(settings).items()
+        power = settings.power_output
         return [
             (self.program.name, "the program"),
             (settings.tool_name, "the tool"),
             (settings.work_object, "the work object"),
             (settings.laser_output, "the output of the laser"),
             *([] if gas is None else [(gas, "the output of the gas")]),
+            *([] if power is None else [(power, "the output of the power")]),
             *((name, f"the {way} of {who}") for (who, way), name in ports if name is not None),
             *((unit, "a mechanical unit") for unit in dict.fromkeys(self._units.units)),
             ("main", "the main routine"),
@@ -229,6 +235,10 @@ class Rapid(Formatter):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a WaitTime."""
         yield f"WaitTime {number(wait.time, 3)};"
+
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield a SetAO; the robot is stopped."""
+        yield f"SetAO {self.output('power')},{self.power_value(power.share)};"
 
     def request(self, request: Request) -> Iterator[str]:
         """Yield a SetDO; the robot is stopped."""
@@ -301,7 +311,8 @@ def ending_lines() -> list[str]:
 
 def switch_off_lines(settings: RapidSettings) -> list[str]:
     """Return the lines that switch off everything that the settings name."""
-    return [f"SetDO {name},0;" for name in outputs(settings)]
+    power = [] if settings.power_output is None else [f"SetAO {settings.power_output},0;"]
+    return [*(f"SetDO {name},0;" for name in outputs(settings)), *power]
 
 
 def _number_names(prefix: str, keys: Iterable[_Key]) -> dict[_Key, str]:

@@ -22,6 +22,7 @@ ROS = Language(
     check=check,
     zones=False,
     externals=no_settings_needed,
+    no_power="a ROS trajectory has no values of power",
     read=read,
 )
 """The language as registered."""

@@ -11,7 +11,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.post.build import offset_near
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern
-from kerfpath.post.languages import outputs, reset_lines
+from kerfpath.post.languages import reset_lines
 from kerfpath.post.line_reader import (
     END_OF_FILE,
     LineReader,
@@ -20,10 +20,11 @@ from kerfpath.post.line_reader import (
     program_lines,
     statements,
 )
-from kerfpath.post.program import SIGNALS, Switch
+from kerfpath.post.program import SIGNALS, Signal, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
 from kerfpath.post.urscript.writer import (
     FIRST,
+    OFF,
     URScriptSettings,
     full_joint_speed,
     inherited,
@@ -50,7 +51,8 @@ _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
 _MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
 _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
-_SIGNAL = "(laser|gas)"
+_SIGNAL = "(laser|gas|power)"
+_VALUE = r"(True|False|\d+\.\d+)"
 _OUTPUT = r"get_standard_digital_out\(\d\)"
 _DEFINITION = LinePattern(r"def ([A-Za-z]\w*)\(\):")
 _CALL = LinePattern(r"([A-Za-z]\w*)\(\)")
@@ -62,8 +64,8 @@ _STEPS = patterns(
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
         "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
         "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
-        "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
-        "switch": rf"{_SIGNAL}_set\((True|False)\)",
+        "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, {_VALUE}\)",
+        "switch": rf"{_SIGNAL}_set\({_VALUE}\)",
         "guarded": rf"laser_set\(({_OUTPUT}(?: and {_OUTPUT})*)\)",
         "wait": rf"sleep\({_NUMBER}\)",
         "request": r"set_standard_digital_out\((\d), (True|False)\)",
@@ -76,6 +78,7 @@ _WITHOUT_ANSWER = patterns(
     {
         "": r"def await_input.*|waited = .*|while .*|sync\(\)|if .*|popup\(.*|end",
         "off": r"set_standard_digital_out\((\d), False\)",
+        "power_off": r"set_standard_analog_out\((\d), 0\.0\)",
         "end_program": "halt",
     }
 )
@@ -89,7 +92,7 @@ class _Reader(LineReader):
 
     def __init__(self, file: str, text: str, robot: Robot, settings: URScriptSettings) -> None:
         super().__init__(file, robot, settings, statements(program_lines(file, text), "#"))
-        self.signals: list[str] = []
+        self.signals: list[Signal] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
         self.ahead_at: dict[str, str] = {}
@@ -102,12 +105,12 @@ class _Reader(LineReader):
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
         self.expect(reset_lines(inherited(self.settings)))
-        self.expect(stop_lines(outputs(self.settings)))
-        self.can_wait = self.same(self.text, wait_lines([])[0])
+        self.expect(stop_lines(self.settings))
+        self.can_wait = self.same(self.text, wait_lines(self.settings)[0])
         if self.can_wait:
-            self.expect(wait_lines(outputs(self.settings)), _WITHOUT_ANSWER)
+            self.expect(wait_lines(self.settings), _WITHOUT_ANSWER)
         exits = {WAITING: tuple(self.steps)}
-        signals = self.signals
+        signals: list[Signal] = self.signals
         for known in SIGNALS.values():
             if not self.same(self.text, f"global {known}_waits = False"):
                 continue
@@ -123,7 +126,7 @@ class _Reader(LineReader):
             self.advance()
             sections[match[1]] = section_of(match[1], self.section())
         for signal in signals:
-            self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
+            self.expect([f"{signal}_set({OFF[signal]})", f"{signal}_run = run {signal}_thread()"])
         calls: list[str] = []
         while self.same(self.text, f"if {FIRST} <= {len(calls) + 1}:"):
             self.advance()
@@ -204,14 +207,28 @@ class _Reader(LineReader):
     def switch(self, signal: str, on: str) -> None:
         self.require_signal(signal)
         move = self.last_on_path()
+        if signal == "power" and "power" not in self.leads and (move is None or move.zone == 0):
+            if self.ahead:
+                raise self.fault("a power must not be set while a switch is to come")
+            self.power(self.settings.power_output, self.value(signal, on))
+            return
         if self.ahead or move is None:
             raise self.fault("a switch must follow a linear or circular move")
         lead, before = self.leads.pop(signal, (0.0, on))
         if before != on:
             raise self.fault(f"the {signal} is switched to {before} ahead, but to {on} here")
         place = move.elsewhere.get("switches", self.ahead_at.pop(signal, self.place))
+        said = self.value(signal, on)
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
+        if signal == "power":
+            switch = self.power_switch(self.settings.power_output, said, lead)
         self.add_switch(move, switch, place)
+
+    def value(self, signal: str, said: str) -> str:
+        """Return the value that a signal is set to: a number for the power alone."""
+        if (signal == "power") == (said in ("True", "False")):
+            raise self.fault(f"expected {OFF[SIGNALS[signal]]} or the like, got {said}")
+        return said
 
     def guarded(self, needed: str) -> None:
         self.require_signal("laser")

@@ -11,7 +11,7 @@ end.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import sqrt
 from typing import Annotated
 
@@ -36,6 +36,7 @@ from kerfpath.post.languages import (
     setting,
 )
 from kerfpath.post.program import (
+    SIGNALS,
     Await,
     CircularMove,
     JointMove,
@@ -44,7 +45,9 @@ from kerfpath.post.program import (
     Program,
     ProgramIssue,
     Request,
+    SetPower,
     Signal,
+    Switch,
     Wait,
     targets_of,
 )
@@ -60,6 +63,10 @@ from kerfpath.robots import Robot
 
 LOCAL = ("due", "gap", "most", "near", "on", "port", "target", "value", "waited")
 """Names inside the thread and the functions of `switch_lines`; contours must not have them."""
+
+
+OFF: dict[Signal, str] = {"laser": "False", "gas": "False", "power": "0.0"}
+"""Value of each signal that is off."""
 
 
 def distance_ahead(lead_time: float, speed: float, acceleration: float, *, stops: bool) -> float:
@@ -87,16 +94,26 @@ def names(signal: Signal) -> list[str]:
     return [f"{signal}_{part}" for part in parts]
 
 
-def stop_lines(outputs: Sequence[int]) -> list[str]:
-    """Return the lines by which the controller sets outputs low whenever no program runs."""
-    return [f"set_runstate_standard_digital_output_to_value({output}, 1)" for output in outputs]
+def stop_lines(settings: URScriptSettings) -> list[str]:
+    """Return the lines by which the controller sets outputs low whenever no program runs.
+
+    The analogue output of the power gives a voltage.
+    """
+    run = "set_runstate_standard"
+    lines = [f"{run}_digital_output_to_value({output}, 1)" for output in outputs(settings)]
+    if (power := settings.power_output) is not None:
+        lines += [f"set_analog_outputdomain({power}, 1)"]
+        lines += [f"{run}_analog_output_to_value({power}, 1)"]
+    return lines
 
 
-def wait_lines(outputs: Sequence[int]) -> list[str]:
+def wait_lines(settings: URScriptSettings) -> list[str]:
     """Return the lines that define the wait for an input.
 
-    Without an answer all `outputs` are switched off and the program ends.
+    Without an answer everything is switched off and the program ends.
     """
+    power = settings.power_output
+    off = [] if power is None else [f"    set_standard_analog_out({power}, 0.0)"]
     return [
         "def await_input(port, most):",
         "  waited = 0.0",
@@ -105,7 +122,8 @@ def wait_lines(outputs: Sequence[int]) -> list[str]:
         "    waited = waited + get_steptime()",
         "  end",
         "  if get_standard_digital_in(port) == False:",
-        *(f"    set_standard_digital_out({output}, False)" for output in outputs),
+        *(f"    set_standard_digital_out({output}, False)" for output in outputs(settings)),
+        *off,
         '    popup("no answer at an input", title="kerfpath", error=True)',
         "    halt",
         "  end",
@@ -114,13 +132,13 @@ def wait_lines(outputs: Sequence[int]) -> list[str]:
 
 
 def switch_lines(signal: Signal, output: int) -> list[str]:
-    """Return the lines that define how a signal is switched, by which digital output."""
-    put = f"set_standard_digital_out({output}, "
+    """Return the lines that define how a signal is switched, by which output."""
+    put = f"set_standard_{'analog' if signal == 'power' else 'digital'}_out({output}, "
     return [
         f"global {signal}_waits = False",
         f"global {signal}_point = p[0, 0, 0, 0, 0, 0]",
         f"global {signal}_distance = 0.0",
-        f"global {signal}_value = False",
+        f"global {signal}_value = {OFF[signal]}",
         f"thread {signal}_thread():",
         "  while True:",
         "    enter_critical",
@@ -168,9 +186,18 @@ Output = Annotated[int | None, setting("a standard digital output from 0 to 7", 
 Input = Annotated[int | None, setting("a standard digital input from 0 to 7", "0", ge=0, le=7)]
 
 
+Analogue = Annotated[int | None, setting("a standard analogue output, 0 or 1", "0", ge=0, le=1)]
+Full = Annotated[
+    float | None,
+    setting("the share of 10 V at full power, above 0, at most 1", "1.0", gt=0, le=1),
+]
+
+
 class URScriptSettings(PortSettings, output=Output, input=Input):
     """Inputs and outputs of the controller, and accelerations."""
 
+    power_output: Analogue = None
+    power_full: Full = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
     ] = 1200.0
@@ -256,9 +283,9 @@ class URScript(Formatter):
         yield f"  global part_frame = {_pose(part)}"
         yield f"  global {FIRST} = 1"
         yield from (f"  {line}" for line in reset_lines(inherited(self.settings)))
-        yield from (f"  {line}" for line in stop_lines(outputs(self.settings)))
+        yield from (f"  {line}" for line in stop_lines(self.settings))
         if any(isinstance(step, Await) for step in program.steps):
-            yield from (f"  {line}" for line in wait_lines(outputs(self.settings)))
+            yield from (f"  {line}" for line in wait_lines(self.settings))
         for signal in self.signals:
             yield from (f"  {line}" for line in switch_lines(signal, self.output(signal)))
         for section in program.sections:
@@ -266,7 +293,7 @@ class URScript(Formatter):
             yield from (f"    {line}" for line in self.lines(section))
             yield "  end"
         for signal in self.signals:
-            yield f"  {signal}_set(False)"
+            yield f"  {signal}_set({OFF[signal]})"
             yield f"  {signal}_run = run {signal}_thread()"
         for n, section in enumerate(program.sections, 1):
             yield from (f"  if {FIRST} <= {n}:", f"    {section.name}()", "  end")
@@ -277,7 +304,10 @@ class URScript(Formatter):
     def signals(self) -> list[Signal]:
         """Signals that the program can switch."""
         found: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
-        return [*found, "gas"] if "gas" in self.program.signals else found
+        return [*found, *(each for each in SIGNALS.values() if self._switches(each))]
+
+    def _switches(self, signal: Signal) -> bool:
+        return signal != "laser" and signal in self.program.signals
 
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the program, with what it names."""
@@ -313,6 +343,10 @@ class URScript(Formatter):
         """Yield a sleep."""
         yield f"sleep({number(wait.time, 3)})"
 
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield the call that sets the power; the robot is stopped."""
+        yield f"power_set({self.power_value(power.share, 5)})"
+
     def request(self, request: Request) -> Iterator[str]:
         """Yield an output; the robot is stopped."""
         yield f"set_standard_digital_out({self.port(request.partner, 'output')}, {request.on})"
@@ -333,11 +367,15 @@ class URScript(Formatter):
             near = distance_ahead(switch.lead_time, move.speed, acceleration, stops=stops)
             if near > 0:
                 target = self.target[move][-1]
-                yield f"{switch.signal}_ahead({target}, {number(near, 9)}, {switch.on})"
+                value = self._value(switch)
+                yield f"{switch.signal}_ahead({target}, {number(near, 9)}, {value})"
         yield line
         for switch in move.switches:
             needed = (f"get_standard_digital_out({port})" for port in self.needed(switch))
-            yield f"{switch.signal}_set({' and '.join(needed) or switch.on})"
+            yield f"{switch.signal}_set({' and '.join(needed) or self._value(switch)})"
+
+    def _value(self, switch: Switch) -> str:
+        return f"{switch.on}" if switch.share is None else self.power_value(switch.share, 5)
 
     def _targets(self, move: LinearMove) -> str:
         return ", ".join(f"pose_trans(part_frame, {target})" for target in self.target[move])

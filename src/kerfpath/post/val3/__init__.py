@@ -29,6 +29,7 @@ VAL3 = Language(
     byte_order_mark=True,
     assumed={"laser_output": r"BasicIO-1\%Q0"},
     inherited=inherited,
+    no_power="VAL 3 switches outputs only where the robot stands, so no power follows the speed",
     read=read,
 )
 """The language as registered."""

@@ -27,7 +27,7 @@ from kerfpath.job.format.tables.part import (
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
-from kerfpath.job.format.tables.process import ProcessTable
+from kerfpath.job.format.tables.process import ProcessTable, curve_pairs
 from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
@@ -246,6 +246,11 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
         if partners and len(set(partners)) < len(partners):
             raise fault("each partner once", repr(partners), "remove the second")
         return partners
+
+    @field_validator("power_by_speed")
+    @classmethod
+    def _is_a_curve(cls, pairs: list[list[float]] | None) -> list[list[float]] | None:
+        return None if pairs is None else curve_pairs(pairs)
 
     @field_validator("language")
     @classmethod

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from kerfpath.errors import InputError
 from kerfpath.job.format.tables.table import Table
-from kerfpath.job.format.values import NotNegative, Number, Positive, Text, fault, key
+from kerfpath.job.format.values import (
+    NotNegative,
+    Number,
+    Positive,
+    Text,
+    fault,
+    fault_in_words,
+    key,
+)
+from kerfpath.post import power_curve
 
 NORMAL = "normal"
 """The technique of a row, or of a job, that names none."""
@@ -37,6 +48,20 @@ Material = Annotated[Word, key("a material, as charts call it", '"mild steel"')]
 Gas = Annotated[Word | None, key("a gas, as charts call it", '"N2"')]
 Quality = Annotated[Word | None, key("a quality, as charts call it", '"fine"')]
 Thickness = Annotated[Positive, key("a number above 0, at most 500, in mm", "3", le=500)]
+
+
+def curve_pairs(pairs: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Return the pairs of a curve of the power by the speed.
+
+    Raises
+    ------
+    PydanticCustomError
+        It is no such curve.
+    """
+    try:
+        return [list(pair) for pair in power_curve(pairs)]
+    except InputError as error:
+        raise fault_in_words(f"{error}".removeprefix("power_by_speed: ")) from None
 
 
 class StageTable(Table):
@@ -75,6 +100,11 @@ class RowTable(CutTable):
     gas_lead_s: Seconds = None
     stand_off_mm: Height = None
     power_w: Power = None
+    power_by_speed: Annotated[
+        list[list[float]] | None,
+        AfterValidator(lambda pairs: None if pairs is None else curve_pairs(pairs)),
+        key("pairs [share of the speed, share of power_w]", "[[0.0, 0.3], [1.0, 1.0]]"),
+    ] = None
     frequency_hz: Frequency = None
     duty_percent: Duty = None
     pressure_bar: Pressure = None

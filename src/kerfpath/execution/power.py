@@ -1,0 +1,237 @@
+"""The power along programs, by the speed that the tip really has in each move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kerfpath.arrays import Array, Bools, freeze, short_repr
+from kerfpath.errors import InputError
+from kerfpath.execution.executed import run_along, timing_of
+from kerfpath.post import (
+    LinearMove,
+    PowerBySpeed,
+    Program,
+    ProgramOptions,
+    ReadMove,
+    Section,
+    SetPower,
+    Step,
+    Switch,
+    Wait,
+)
+from kerfpath.robots import Robot
+
+SHORTEST = 1e-9
+"""Least time (s) of a move."""
+
+
+def executed_speeds(
+    moves: Sequence[LinearMove],
+    robot: Robot,
+    options: ProgramOptions,
+    *,
+    T_base_part: Array,
+    T_flange_tip: Array,
+) -> Array:
+    """Return the mean speed (m,) m/s of the tip in each of m moves, as they are executed.
+
+    From stop to stop, the robot runs at the programmed speeds where the limits of the joints allow
+    them, from rest and to rest, see `timing_of`; LinuxCNC as the model of its planner says. The lag
+    of the joints is left out. In a table, moves take their planned times.
+
+    Parameters
+    ----------
+    moves : sequence of LinearMove
+        The move to where the robot stands, then the m moves.
+    robot : Robot
+    options : ProgramOptions
+        With the language, whose controller runs the path.
+    T_base_part, T_flange_tip : (4, 4) m
+
+    Raises
+    ------
+    InputError
+        The limits of the robot are not known, or the posture does not reach the path.
+    """
+    spoken, settings = options.robot_language, options.language_settings
+    planned = np.array([move.duration for move in moves[1:]])
+    length = np.array([move.speed for move in moves[1:]]) * planned
+    took = planned.copy()
+    stops = [0, *(k for k, move in enumerate(moves) if k > 0 and move.zone == 0)]
+    stops += [] if stops[-1] == len(moves) - 1 else [len(moves) - 1]
+    for first, last in pairwise(stops):
+        if spoken.durations is not None:
+            q = np.array([move.q for move in moves[first : last + 1]])
+            took[first:last] = spoken.durations(robot, q, planned[first:last], settings)
+        elif spoken.zones and last - first > 1:
+            run = run_along(
+                moves[first : last + 1],
+                robot,
+                T_base_part=T_base_part,
+                T_flange_tip=T_flange_tip,
+                controller=options.rules.controller,
+                bounded=False,
+            )
+            timing = timing_of(run)
+            took[first:last] = np.diff(np.interp(run.tool_motion.time, timing.time, timing.clock))
+    return np.asarray(length / np.maximum(took, SHORTEST))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PowerAlong:
+    """The power along a cut of m moves.
+
+    Parameters
+    ----------
+    s : (m+1,) m
+        Length of the way up to the target of each move, from 0 at the start.
+    speed : (m,)
+        Executed speed in each move, as a share of the highest programmed one.
+    asked : (m,)
+        Share of the full power by that speed.
+    set : (m,)
+        Share of the full power that the program sets.
+    lit : (m,) bool
+        Whether the laser is on; it is off along micro joints.
+    """
+
+    s: Array
+    speed: Array
+    asked: Array
+    set: Array
+    lit: Bools
+
+    __repr__ = short_repr
+
+    @property
+    def switches(self) -> int:
+        """How often the power changes within the cut."""
+        return int((np.diff(self.set) != 0).sum())
+
+    @property
+    def difference(self) -> float:
+        """Largest difference of the power from what is asked, where the laser is on."""
+        return float(np.abs(self.set - self.asked)[self.lit].max(initial=0.0))
+
+
+def power_along(program: Program, section: Section, options: ProgramOptions) -> PowerAlong | None:
+    """Return the power along a cut of a program; None if the program does not set it.
+
+    Raises
+    ------
+    InputError
+        As `executed_speeds`.
+    """
+    law = options.power
+    if law is None:
+        return None
+    moves = [move for move in section.moves if isinstance(move, LinearMove)][:-1]
+    speed = executed_speeds(
+        moves,
+        program.robot,
+        options,
+        T_base_part=program.T_base_part,
+        T_flange_tip=program.T_flange_tip,
+    )
+    share = shares_of(moves, speed)
+    ways = [move.speed * move.duration for move in moves[1:]]
+    lit = lit_of(moves)
+    return PowerAlong(
+        s=freeze(np.append(0.0, np.cumsum(ways))),
+        speed=freeze(share),
+        asked=freeze(law.at(share)),
+        set=freeze(_beside_switches(law.steps(share), lit)),
+        lit=lit,
+    )
+
+
+def lit_of(moves: Sequence[LinearMove | ReadMove]) -> Bools:
+    """Return whether the laser is on in each of m moves, after the approach, the first of them."""
+    on, found = False, []
+    for move in moves:
+        found.append(on)
+        for switch in move.switches:
+            on = switch.on if switch.signal == "laser" else on
+    return np.array(found[1:], dtype=np.bool_)
+
+
+def _beside_switches(power: Array, lit: Bools) -> Array:
+    """Return the power in moves, changed inside micro joints and not where the laser is switched.
+
+    Some controllers set one output at a target. The power is changed where it has no effect.
+    """
+    found = power.copy()
+    for k in np.flatnonzero(~lit).tolist():
+        after = np.flatnonzero(lit[k:])
+        begins = k > 0 and lit[k - 1]
+        found[k] = found[k - 1] if begins or not after.size else power[k + after[0]]
+    return found
+
+
+def shares_of(moves: Sequence[LinearMove], speed: Array) -> Array:
+    """Return executed speeds (m,) m/s as shares of the speed that a cut of m moves is made at.
+
+    Arguments are those and the result of `executed_speeds`. The highest programmed speed counts as
+    full speed: where the program reduces it, the power falls, too.
+    """
+    full = max(move.speed for move in moves[1:])
+    return np.asarray(np.clip(speed / full, 0.0, 1.0))
+
+
+def with_power(program: Program, options: ProgramOptions) -> Program:
+    """Return the program with the power by the executed speed, if its options ask for it.
+
+    Before the approach, with the laser off, the power is set to that of the pierce; behind the
+    pierce, and at targets, to the step of each move; and to 0 before the tool backs off.
+
+    Parameters
+    ----------
+    program : Program
+        As `build_program` returns it.
+    options : ProgramOptions
+
+    Raises
+    ------
+    InputError
+        The language cannot set the power along the path; or as `executed_speeds`.
+    """
+    law = options.power
+    if law is None:
+        return program
+    if why := options.robot_language.no_power:
+        raise InputError(f"power_by_speed: {why}; leave it out, or use another language")
+    sections = tuple(_with_power(program, s, law, options) for s in program.sections)
+    return replace(program, sections=sections)
+
+
+def _with_power(
+    program: Program, section: Section, law: PowerBySpeed, options: ProgramOptions
+) -> Section:
+    along = power_along(program, section, options)
+    assert along is not None
+    approach, *cut, retract = (move for move in section.moves if isinstance(move, LinearMove))
+    powers = dict(zip(cut, along.set.tolist(), strict=True))
+    after = dict(pairwise([*cut, None]))
+    pierces = any(isinstance(step, Wait) for step in section.steps)
+    now = law.piercing if pierces else powers[cut[0]]
+    steps: list[Step] = []
+    for step in section.steps:
+        if step is approach:
+            steps.append(SetPower(share=now))
+        elif step is cut[0] and now != powers[cut[0]]:
+            now = powers[cut[0]]
+            steps.append(SetPower(share=now))
+        elif step is retract:
+            steps.append(SetPower(share=0.0))
+        following = after.get(step) if isinstance(step, LinearMove) else None
+        if isinstance(step, LinearMove) and following is not None and powers[following] != now:
+            now = powers[following]
+            lead = options.lead_time if options.robot_language.ahead else 0.0
+            change = Switch(signal="power", on=now > 0, lead_time=lead, share=now)
+            step = replace(step, switches=(*step.switches, change))
+        steps.append(step)
+    return replace(section, steps=tuple(steps))

@@ -1,0 +1,131 @@
+"""The power along a cut: that of the job, and the check of the one in a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath.arrays import Ints
+from kerfpath.auditor import Check
+from kerfpath.execution import executed_speeds, lit_of, shares_of
+from kerfpath.job.audit_report import check, count, count_at
+from kerfpath.job.format import Job
+from kerfpath.post import (
+    LinearMove,
+    ReadGroup,
+    ReadMove,
+    ReadPower,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+)
+
+SAME_POWER = 2e-3
+"""Tolerance of shares of the full power, for the digits of analogue outputs."""
+SLACK = 0.01
+"""Share of the full power by which a program's power may leave the curve beyond its steps, because
+the digits of its speeds and targets move the borders between them."""
+SAME_LEAD = 2e-3
+"""Tolerance (s) of lead times against the job; controllers round them."""
+
+
+def without_power(read: ReadProgram) -> ReadProgram:
+    """Return a program without all that sets its power."""
+
+    def bare(step: ReadStep) -> ReadStep:
+        if not isinstance(step, ReadMove) or all(s.signal != "power" for s in step.switches):
+            return step
+        return replace(step, switches=tuple(s for s in step.switches if s.signal != "power"))
+
+    def rest(section: ReadSection) -> ReadSection:
+        steps = tuple(bare(step) for step in section.steps if not isinstance(step, ReadPower))
+        return replace(section, steps=steps)
+
+    return replace(read, sections=tuple(rest(section) for section in read.sections))
+
+
+def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: Ints) -> list[Check]:
+    """Return the checks of the power along a cut of a program.
+
+    Parameters
+    ----------
+    job : Job
+    group : ReadGroup
+        The cut with its approach and retract.
+    moves : sequence of LinearMove
+        The move to the start of the cut, and those of the cut, as its text says them.
+    ends : (m,) int
+        Node of the target of each.
+    """
+    path, law = group.path, job.program.power
+    switched = [(k, s) for k, move in enumerate(path) for s in move.switches]
+    switched = [(k, s) for k, s in switched if s.signal == "power"]
+    if law is None:
+        many = len(switched) + len(group.powers)
+        return [count("power", "settings of the power that the job does not ask for", many)] * (
+            many > 0
+        )
+    odd = [node_of(ends, at) for at, _ in group.powers if at not in (0, 1, len(path) - 1)]
+    said = _in_moves(group)
+    speed = executed_speeds(
+        moves,
+        job.robot,
+        job.program,
+        T_base_part=job.placement,
+        T_flange_tip=job.tool,
+    )
+    cut = np.array(said[1:-1])
+    off = np.where(lit_of(path[:-1]), np.abs(cut - law.at(shares_of(moves, speed))), 0.0)
+    wrong = np.flatnonzero(np.abs(cut - law.nearest(cut)) > SAME_POWER)
+    k = int(np.argmax(off))
+    pierce = [abs(_while_waiting(group, wait.line) - law.piercing)
+              for at, wait in group.waits if at == 1]  # fmt: skip
+    lead = job.program.lead_time if job.program.robot_language.ahead else 0.0
+    late = [abs(s.lead_time - lead) for _, s in switched]
+    return [
+        check(
+            "power",
+            "difference of the power from that by the speed of the job",
+            off[k],
+            law.tolerance + SLACK,
+            "share",
+            int(ends[k]),
+        ),
+        count_at("power-steps", "moves with a power that is none of the job's steps",
+                 [int(ends[i]) for i in wrong]),
+        count_at("power-standing", "settings of the power where the robot moves", odd),
+        check("power-pierce", "difference of the power at the pierce from the job's",
+              max(pierce, default=0.0), SAME_POWER, "share"),
+        check("power-lead", "difference of the power's lead time from the job's",
+              max(late, default=0.0), SAME_LEAD, "s"),
+        check("power-off", "power while the tool backs off", said[-1], 0.0, "share",
+              int(ends[-1])),
+    ]  # fmt: skip
+
+
+def node_of(ends: Ints, at: int) -> int:
+    """Return the node at which the robot is after `at` moves of the path."""
+    return int(ends[min(max(at - 1, 0), len(ends) - 1)])
+
+
+def _in_moves(group: ReadGroup) -> list[float]:
+    """Return the share of the full power in each move of the path."""
+    now, found = 0.0, []
+    for k, move in enumerate(group.path):
+        for at, power in group.powers:
+            now = power.share if at == k else now
+        found.append(now)
+        for switch in move.switches:
+            now = now if switch.share is None else switch.share
+    return found
+
+
+def _while_waiting(group: ReadGroup, line: int) -> float:
+    """Return the share of the full power while the robot waits at the start, at a line."""
+    now = 0.0
+    for at, power in group.powers:
+        if at == 0 or (at == 1 and power.line < line):
+            now = power.share
+    return now

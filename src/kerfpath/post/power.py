@@ -1,0 +1,102 @@
+"""The power of the beam by the speed of the tip: a curve, and the steps in which outputs follow it.
+
+An output is set at targets alone. It keeps a step until the curve has left it by more than half a
+step and a margin, so that a speed between two steps does not switch it to and fro.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from kerfpath.arrays import Array, short_repr
+from kerfpath.errors import InputError
+
+PowerCurve = tuple[tuple[float, float], ...]
+"""Pairs of a share of the programmed speed and a share of the full power, by rising speed."""
+MARGIN = 0.25
+"""Share of a step by which the curve passes the border to the next before the power follows."""
+
+
+def power_curve(pairs: Sequence[Sequence[float]]) -> PowerCurve:
+    """Return a curve as given by pairs.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two pairs, or the speeds do not rise from 0 to 1, or a power is not a
+        share from 0 to 1.
+    """
+    expected = "power_by_speed: expected pairs [share of the speed, share of the power]"
+    try:
+        found = tuple((float(speed), float(power)) for speed, power in pairs)
+    except (TypeError, ValueError):
+        raise InputError(f"{expected}, got {pairs!r}") from None
+    speeds = [speed for speed, _ in found]
+    if len(found) < 2 or speeds[0] != 0 or speeds[-1] != 1:
+        raise InputError(f"{expected} from speed 0 to speed 1, got speeds {speeds}")
+    if not all(one < two for one, two in pairwise(speeds)):
+        raise InputError(f"{expected} with rising speeds, got {speeds}")
+    if wrong := [power for _, power in found if not 0 <= power <= 1]:
+        raise InputError(f"{expected} with powers from 0 to 1, got {wrong[0]:g}")
+    if found[-1][1] == 0:
+        raise InputError(f"{expected} with a power above 0 at speed 1, got 0")
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class PowerBySpeed:
+    """How the power follows the speed.
+
+    Parameters
+    ----------
+    curve : tuple of (float, float)
+        As `power_curve` returns it.
+    step : float
+        Step of the power, a share of the full power; one of the steps is the power at full speed.
+    pierce : float or None
+        Share of the full power while the beam pierces; None: that of the full speed.
+    """
+
+    curve: PowerCurve
+    step: float
+    pierce: float | None = None
+
+    __repr__ = short_repr
+
+    @property
+    def full(self) -> float:
+        """Share of the full power at full speed."""
+        return self.curve[-1][1]
+
+    @property
+    def piercing(self) -> float:
+        """Share of the full power while the beam pierces."""
+        return self.full if self.pierce is None else self.pierce
+
+    @property
+    def tolerance(self) -> float:
+        """Largest difference of a step from the curve, a share of the full power."""
+        return (0.5 + MARGIN) * self.step
+
+    def at(self, speed: Array) -> Array:
+        """Return the shares of the full power at shares (m,) of the programmed speed."""
+        return np.asarray(np.interp(speed, *np.array(self.curve).T))
+
+    def nearest(self, power: Array) -> Array:
+        """Return the steps next to shares (m,) of the full power."""
+        return np.asarray(
+            np.clip(self.full + self.step * np.round((power - self.full) / self.step), 0.0, 1.0)
+        )
+
+    def steps(self, speed: Array) -> Array:
+        """Return the step of the power in each of m moves with shares (m,) of the speed."""
+        asked = self.at(speed)
+        found = self.nearest(asked)
+        for k in range(1, len(found)):
+            if abs(asked[k] - found[k - 1]) <= self.tolerance:
+                found[k] = found[k - 1]
+        return found
