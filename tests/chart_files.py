@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import zipfile
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 from kerfpath.job import chart_files, read_chart, read_foreign
 from spoilt import Whole
@@ -59,7 +61,52 @@ LIGHTBURN = """\
   </Material>
 </LightBurnLibrary>
 """
+CONTENT = """\
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="xml" ContentType="application/xml"/>
+<Override PartName="/xl/workbook.xml" ContentType=
+"application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/>
+</Types>"""
+MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+OFFICE = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
 FOREIGN = {"mill_material.cfg": QTPLASMAC, "table.csv": TABLE, "shop.clb": LIGHTBURN}
+
+
+def write_spreadsheet(path: Path, **sheets: list[list[str | float | None]]) -> None:
+    """Write sheets of cells, text or numbers, as a spreadsheet (.xlsx)."""
+
+    def cell(value: str | float | None) -> str:
+        if value is None:
+            return "<c/>"
+        if isinstance(value, str):
+            return f'<c t="inlineStr"><is><t>{escape(value)}</t></is></c>'
+        return f"<c><v>{value!r}</v></c>"
+
+    def relations(*kinds: tuple[str, str]) -> str:
+        parts = "".join(
+            f'<Relationship Id="r{i}" Type="{OFFICE}/{kind}" Target="{target}"/>'
+            for i, (kind, target) in enumerate(kinds, 1)
+        )
+        return f'<Relationships xmlns="{PACKAGE}">{parts}</Relationships>'
+
+    names = "".join(
+        f'<sheet name="{name}" sheetId="{i}" r:id="r{i}"/>' for i, name in enumerate(sheets, 1)
+    )
+    book = f'<workbook xmlns="{MAIN}" xmlns:r="{OFFICE}"><sheets>{names}</sheets></workbook>'
+    files = [f"worksheets/sheet{i}.xml" for i in range(1, len(sheets) + 1)]
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("[Content_Types].xml", CONTENT)
+        archive.writestr("_rels/.rels", relations(("officeDocument", "xl/workbook.xml")))
+        archive.writestr("xl/workbook.xml", book)
+        archive.writestr(
+            "xl/_rels/workbook.xml.rels", relations(*(("worksheet", file) for file in files))
+        )
+        for file, rows in zip(files, sheets.values(), strict=True):
+            data = "".join(f"<row>{''.join(map(cell, row))}</row>" for row in rows)
+            sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{data}</sheetData></worksheet>'
+            archive.writestr(f"xl/{file}", sheet)
 
 
 def charts(folder: Path) -> list[Whole]:
@@ -72,8 +119,9 @@ def charts(folder: Path) -> list[Whole]:
 
 
 def foreign_charts(folder: Path) -> list[Whole]:
-    """A chart of QtPlasmaC, a table, and a library of LightBurn."""
-    found = []
+    """A chart of QtPlasmaC, a table, a spreadsheet, and a library of LightBurn."""
+    write_spreadsheet(folder / "table.xlsx", steel=[line.split(";") for line in TABLE.split("\n")])
+    found = [Whole(folder / "table.xlsx", folder / "table.xlsx")]
     for name, text in FOREIGN.items():
         (folder / name).write_text(text, encoding="utf-8")
         found.append(Whole(folder / name, folder / name))

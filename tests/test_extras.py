@@ -47,7 +47,7 @@ def test_planning_from_arrays_needs_no_extra():
 @pytest.mark.parametrize(
     ("code", "said"),
     [
-        ("import kerfpath.job", "jobs: ortools, pydantic, rich"),
+        ("import kerfpath.job", "jobs: ortools, pydantic, python_calamine, rich"),
         ("import kerfpath.post", "robot programs: ortools, pydantic"),
         ("from kerfpath import read_plan_file", "kerfpath[programs]"),
         ("import kerfpath.report", "reports: jinja2, plotly is needed and not installed"),

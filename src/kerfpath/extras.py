@@ -14,7 +14,8 @@ NEEDS = {
     "cluster": ("distributed",),
     "general": ("ssik",),
     "programs": (
-        "ortools", "pydantic", "rich", "tomlkit", "tree_sitter", "tree_sitter_toml", "typer",
+        "ortools", "pydantic", "python_calamine", "rich", "tomlkit", "tree_sitter",
+        "tree_sitter_toml", "typer",
     ),
     "report": ("jinja2", "plotly"),
     "studio": ("starlette", "uvicorn", "websockets"),

@@ -481,7 +481,7 @@ def test_inches_of_qtplasmac_are_scaled(tmp_path):
         ("THC ", "TCH ", {"unit": "mm"}, [":5: ", "'TCH'"]),
         ("5mm Mild", "Mild", {"unit": "mm"}, ["thickness_mm", "--thickness-mm"]),
         ("[MATERIAL_NUMBER_4]", "[MATERIAL_NUMBER_1]", {"unit": "mm"}, [":16: ", "once"]),
-        ("", "", {"unit": "mm", "columns": ["a=b"]}, ["--map", ".csv"]),
+        ("", "", {"unit": "mm", "columns": ["a=b"]}, ["a table with --map", ".cfg"]),
     ],
 )
 def test_faults_of_qtplasmac_are_refused(tmp_path, old, new, how, words):
@@ -535,9 +535,56 @@ def test_entries_of_lightburn_are_rows(tmp_path):
     assert "'plywood' 'paper': left out, as it has no thickness" in notes
 
 
+CELLS = [
+    ["Material", "Thickness [mm]", "Speed (mm/min)", "kerf mm", "when"],
+    ["steel", 3.0, 4200.5, 0.2, "2026-11-30"],
+    [None, None, None, None, None],
+    ["steel", 6, "2600,5", "-", None],
+]
+
+
+def test_a_spreadsheet_is_a_table(tmp_path):
+    made.write_spreadsheet(tmp_path / "t.xlsx", steel=CELLS)
+    text, notes = read_foreign(tmp_path / "t.xlsx")
+    (tmp_path / "t.toml").write_text(text)
+    one, two = read_chart(tmp_path / "t.toml").table.row
+    assert (one.material, one.thickness_mm, one.kerf_mm) == ("steel", 3, 0.2)
+    assert one.speed_m_min == pytest.approx(4.2005)
+    assert two.speed_m_min == pytest.approx(2.6005)
+    assert two.kerf_mm is None
+    assert "column 'when' is left out: it is no key of a chart" in notes
+
+
+def test_one_of_several_sheets_is_named(tmp_path):
+    path = tmp_path / "t.xlsx"
+    made.write_spreadsheet(path, steel=CELLS, empty=[], brass=CELLS[:2])
+    refused(lambda: read_foreign(path), "t.xlsx", "--sheet", "'steel', 'empty', 'brass'")
+    refused(lambda: read_foreign(path, sheet="tin"), "--sheet", "'brass'", "'tin'")
+    refused(lambda: read_foreign(path, sheet="empty"), "names and rows")
+    text, _ = read_foreign(path, sheet="brass")
+    assert text.count("[[row]]") == 1
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (["steel", 3, "fast", 0.2, None], [":2: ", "'Speed (mm/min)'", "'fast'"]),
+        (["steel", 3, "4\u202e2", 0.2, None], [":2: ", "U+202E"]),
+        (["steel", 3], ["rows to convert"]),
+    ],
+)
+def test_faults_of_spreadsheets_are_refused(tmp_path, row, words):
+    made.write_spreadsheet(tmp_path / "t.xlsx", steel=[CELLS[0], row])
+    refused(lambda: read_foreign(tmp_path / "t.xlsx"), "t.xlsx", *words)
+
+
 def test_other_files_are_not_converted(tmp_path):
     (tmp_path / "chart.xlsx").write_bytes(b"PK")
-    refused(lambda: read_foreign(tmp_path / "chart.xlsx"), "save the sheet as CSV")
+    refused(lambda: read_foreign(tmp_path / "chart.xlsx"), "not a spreadsheet", "as CSV")
+    (tmp_path / "chart.pdf").write_bytes(b"%PDF")
+    refused(lambda: read_foreign(tmp_path / "chart.pdf"), "expected a chart", ".pdf")
+    (tmp_path / "t.csv").write_text("a\n")
+    refused(lambda: read_foreign(tmp_path / "t.csv", sheet="a"), "--sheet")
 
 
 # -----------------------------------------------------------------------------

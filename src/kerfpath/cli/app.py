@@ -436,8 +436,11 @@ def charts(
         typer.Option(
             "--map",
             metavar="COLUMN=KEY",
-            help="With convert: a column of a CSV and the key that it has, once for each.",
+            help="With convert: a column of a table and the key that it has, once for each.",
         ),
+    ] = None,
+    sheet: Annotated[
+        str | None, typer.Option(help="With convert: the sheet of a spreadsheet with several.")
     ] = None,
     unit: Annotated[
         Literal["mm", "inch"] | None,
@@ -456,8 +459,8 @@ def charts(
 ) -> None:
     """List, show, check or convert cut charts: speed, kerf, pierce and power by material.
 
-    A job uses a chart with the table [process]. Files of QtPlasmaC (_material.cfg), CSV and
-    LightBurn (.clb) are converted; what they lack is listed.
+    A job uses a chart with the table [process]. Files of QtPlasmaC (_material.cfg), tables (.csv,
+    .xlsx, .xls, .ods) and LightBurn (.clb) are converted; what they lack is listed.
 
     Example: kerfpath charts show --job door.toml
     """
@@ -478,6 +481,7 @@ def charts(
             Path((names or [""])[0]),
             output,
             columns=columns or (),
+            sheet=sheet,
             unit=unit,
             said={"material": material, "thickness_mm": thickness_mm, "gas": gas},
         )

@@ -117,13 +117,14 @@ def convert(
     output: Path | None,
     *,
     columns: Sequence[str],
+    sheet: str | None,
     unit: str | None,
     said: Mapping[str, str | float | None],
 ) -> None:
     """Convert a foreign chart, and print what it lacks; without `output` print the chart."""
     if output is not None and output.exists():
         raise InputError(f"{output}: exists already; name another file with --output")
-    text, notes = read_foreign(file, columns=columns, unit=unit, said=said)
+    text, notes = read_foreign(file, columns=columns, sheet=sheet, unit=unit, said=said)
     print_json({"chart": text, "notes": list(notes)})
     if output is None:
         out.print(escape(text), end="")

@@ -15,9 +15,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 from pydantic import ValidationError
+from python_calamine import CalamineError, CalamineWorkbook
 
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
+from kerfpath.isolated import call_apart
 from kerfpath.job.format import ChartFile, RowTable, toml_lines
 from kerfpath.text import NOT_TEXT, named
 
@@ -60,6 +62,7 @@ def read_foreign(
     file: Path,
     *,
     columns: Sequence[str] = (),
+    sheet: str | None = None,
     unit: str | None = None,
     said: Mapping[str, str | float | None] | None = None,
 ) -> tuple[str, tuple[str, ...]]:
@@ -68,9 +71,11 @@ def read_foreign(
     Parameters
     ----------
     file : Path
-        A QtPlasmaC file (.cfg), a table (.csv) or a library of LightBurn (.clb).
+        A QtPlasmaC file (.cfg), a table (.csv, .xlsx, .xls, .ods) or a library of LightBurn (.clb).
     columns : sequence of str
         For a table: COLUMN=KEY, the key of a chart that a column has.
+    sheet : str, optional
+        For a spreadsheet: the name of the sheet; needed if there are several with rows.
     unit : {"mm", "inch"}, optional
         For a QtPlasmaC file: the unit of the machine, which the file does not say.
     said : mapping
@@ -83,24 +88,29 @@ def read_foreign(
     """
     usual = {key: value for key, value in (said or {}).items() if value is not None}
     kind = file.suffix.lower()
-    if kind not in (".cfg", ".csv", ".clb"):
-        hint = "save the sheet as CSV" if kind in (".xlsx", ".xls", ".ods") else "name such a file"
+    if kind not in (".cfg", ".csv", ".clb", *SPREADSHEETS):
         raise InputError(
-            f"{file}: expected a chart of QtPlasmaC (.cfg), a table (.csv) or a library of "
-            f"LightBurn (.clb), got {kind or 'no suffix'}; {hint}"
+            f"{file}: expected a chart of QtPlasmaC (.cfg), a table (.csv, "
+            f"{', '.join(SPREADSHEETS)}) or a library of LightBurn (.clb), got "
+            f"{kind or 'no suffix'}; name such a file"
         )
-    if columns and kind != ".csv":
-        raise InputError(f"{file}: expected a table (.csv) with --map, got {kind}; remove --map")
+    is_table = kind == ".csv" or kind in SPREADSHEETS
+    if columns and not is_table:
+        raise InputError(f"{file}: expected a table with --map, got {kind}; remove --map")
+    if sheet is not None and kind not in SPREADSHEETS:
+        raise InputError(f"{file}: expected a spreadsheet with --sheet, got {kind}; remove --sheet")
     if unit is not None and kind != ".cfg":
-        said_by = "its columns say their units" if kind == ".csv" else "its units are known"
+        said_by = "its columns say their units" if is_table else "its units are known"
         raise InputError(f"{file}: expected no --unit, as {said_by}, got {unit}; remove it")
-    text = _text(file)
-    if kind == ".cfg":
-        made = _of_qtplasmac(file, text, unit, usual)
+    if kind in SPREADSHEETS:
+        made = _of_table(file, _spreadsheet(file, sheet), columns, usual, decimal_comma=True)
     elif kind == ".csv":
-        made = _of_table(file, text, columns, usual)
+        table, delimiter = _csv(file, _text(file))
+        made = _of_table(file, table, columns, usual, decimal_comma=delimiter != ",")
+    elif kind == ".cfg":
+        made = _of_qtplasmac(file, _text(file), unit, usual)
     else:
-        made = _of_lightburn(file, text, usual)
+        made = _of_lightburn(file, _text(file), usual)
     if not made.rows:
         raise InputError(f"{file}: expected rows to convert, got none; {'; '.join(made.notes)}")
     chart = _checked(file, made)
@@ -138,7 +148,7 @@ def _checked(file: Path, made: Converted) -> str:
     return text
 
 
-def _text(file: Path) -> str:
+def _bytes(file: Path) -> bytes:
     try:
         if not file.is_file():
             why = "it is not a file" if file.exists() else "no such file"
@@ -149,6 +159,11 @@ def _text(file: Path) -> str:
         raise InputError(f"{file}: cannot be read ({why})") from None
     if len(raw) > MOST_BYTES:
         raise InputError(f"{file}: expected at most {MOST_BYTES / 1e6:.0f} MB, got more")
+    return raw
+
+
+def _text(file: Path) -> str:
+    raw = _bytes(file)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -305,6 +320,8 @@ def _unlike(where: str, expected: str, got: str) -> InputError:
 # -----------------------------------------------------------------------------
 # Tables: the name of a column has quantity and unit, or --map says what it is.
 
+SPREADSHEETS = (".xlsx", ".xls", ".ods")
+
 UNITS: Mapping[str, Mapping[str, float]] = {
     "mm": {"mm": 1, "in": INCH, "inch": INCH, "um": 1e-3, "cm": 10},
     "m_min": {
@@ -382,15 +399,72 @@ def _column(words: str, where: str) -> _Column | None:
     return None
 
 
-def _of_table(
-    file: Path, text: str, columns: Sequence[str], usual: Mapping[str, str | float]
-) -> Converted:
+def _csv(file: Path, text: str) -> tuple[list[list[str]], str]:
+    """Return the cells of a CSV file, row by row, and what separates them."""
     first = text.partition("\n")[0]
     delimiter = max(";\t,", key=first.count)
     try:
-        table = list(csv.reader(text.splitlines(), delimiter=delimiter, strict=True))
+        return list(csv.reader(text.splitlines(), delimiter=delimiter, strict=True)), delimiter
     except csv.Error as error:
         raise InputError(f"{file}: not a table: {error}; save it as CSV again") from None
+
+
+def _spreadsheet(file: Path, sheet: str | None) -> list[list[str]]:
+    """Return the cells of a sheet of a spreadsheet, row by row, from the row of names on."""
+    size = len(_bytes(file))
+    try:
+        sheets = call_apart(read_sheets, str(file.absolute()), size=size)
+    except InputError as error:
+        raise InputError(f"{file}: {error}; save the sheet as CSV") from None
+    filled = {name: rows for name, rows in sheets.items() if rows}
+    names = ", ".join(map(repr, sheets))[:200]
+    if sheet is None and len(filled) > 1:
+        raise InputError(f"{file}: expected --sheet with one of {names}, got none")
+    if sheet is not None and sheet not in sheets:
+        raise InputError(f"{file}: --sheet: expected one of {names}, got {sheet!r}")
+    rows = sheets[sheet] if sheet is not None else next(iter(filled.values()), [])
+    for number, cells in enumerate(rows, 1):
+        for cell in cells:
+            if (found := NOT_TEXT.search(cell)) is not None:
+                said = f"expected text, got {named(found[0])}; remove it"
+                raise InputError(f"{file}:{number}: {said}")
+    return rows
+
+
+def read_sheets(file: str) -> dict[str, list[list[str]]]:
+    """Return the cells of each sheet of a spreadsheet as text, row by row from the first.
+
+    Raises
+    ------
+    InputError
+        The file is no spreadsheet, or damaged; the message does not name it.
+    """
+    try:
+        with CalamineWorkbook.from_path(file) as book:
+            sheets = {
+                n: book.get_sheet_by_name(n).to_python(skip_empty_area=False)
+                for n in book.sheet_names
+            }
+    except (CalamineError, OSError) as error:
+        raise InputError(f"not a spreadsheet that can be read ({error})") from None
+    return {name: [[_cell(cell) for cell in row] for row in rows] for name, rows in sheets.items()}
+
+
+def _cell(value: object) -> str:
+    """Return the value of a cell as text: a number to 15 digits, else on one line."""
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        return f"{value:.15g}"
+    return " ".join(str(value).split())
+
+
+def _of_table(
+    file: Path,
+    table: Sequence[Sequence[str]],
+    columns: Sequence[str],
+    usual: Mapping[str, str | float],
+    *,
+    decimal_comma: bool,
+) -> Converted:
     if len(table) < 2:
         raise InputError(f"{file}: expected a line of names and rows under it, got {len(table)}")
     made = Converted(source=f"{file.name}, converted")
@@ -412,7 +486,7 @@ def _of_table(
             if kind.scale is None:
                 row[kind.key] = said
                 continue
-            plain = said.replace(",", ".") if delimiter != "," else said
+            plain = said.replace(",", ".") if decimal_comma else said
             value = _number(plain, f"{file}:{number}: column {name.strip()!r}") * kind.scale
             into, key = (stage, PIERCE[kind.key]) if kind.key in PIERCE else (row, kind.key)
             into[key] = round(value, 9)
