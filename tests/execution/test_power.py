@@ -1,5 +1,6 @@
 """The power by the speed in programs: how near it is to its curve, and what languages refuse."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +36,15 @@ POWER = {
     "urscript": {"power_output": 0, "power_full": 1.0},
     "csv": {},
 }
+BY_CONTROLLER = {
+    "rapid": (
+        {"power_output": "aoPower", "power_full": 10.0},
+        r"TriggSpeed trFollow,0\\Start,0.0200,",
+    ),
+    "krl": ({"power_output": 1, "power_full": 1.0}, r"ANOUT ON power_out=16\.6\d+\*\$VEL_ACT"),
+    "inform": ({"power_output": 1, "power_full": 10.0}, r"ARATION AO#\(1\) BV=10.00 V=60.0 OFV"),
+}
+"""Settings of the languages whose controller sets a power by the speed, and its statement."""
 WITHOUT = sorted(CASES.keys() - POWER.keys())
 in_each = pytest.mark.parametrize("name", POWER)
 
@@ -97,9 +107,40 @@ def test_the_power_is_that_of_the_pierce_then_of_the_cut_and_zero_in_the_air(nam
 
 @pytest.mark.parametrize("name", WITHOUT)
 def test_a_language_that_sets_no_output_on_the_path_refuses_in_one_line(name):
-    with pytest.raises(InputError, match=r"power_by_speed: .*use another language") as caught:
+    with pytest.raises(InputError, match=r"power_by_speed: .*, or use another language") as caught:
         powered(name)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", BY_CONTROLLER)
+def test_a_controller_sets_the_power_in_proportion_to_the_speed(name):
+    case, (power, statement) = CASES[name], BY_CONTROLLER[name]
+    options = ProgramOptions(
+        language=name, settings=case.language.settings(**case.options, **power),
+        power_by_speed=((0.0, 0.0), (1.0, 1.0)), power_follows="controller", pierce_time=0.3,
+        lead_time=0.02 if case.language.ahead else 0.0, pierce_power=0.55,
+    )  # fmt: skip
+    program = with_power(build_program([dipping(case)], options), options)
+    along = power_along(program, program.sections[0], options)
+    assert along.switches == 0
+    assert along.difference < 1e-12
+    files, read = case.reads_back(program, options.settings)
+    assert re.search(statement, "\n".join(files.values()))
+    powers = [(s.share, s.per_speed) for s in read.steps if isinstance(s, ReadPower)]
+    assert powers == [
+        pytest.approx(each, rel=2e-3, abs=1e-3) for each in ((0.55, 0), (0, 1 / 0.06), (0, 0))
+    ]
+    assert unsafe_paths(read) == []
+
+
+def test_a_curve_that_no_controller_follows_is_refused():
+    with pytest.raises(InputError, match=r"30.0% of the full power off the curve, allowed 7.5%"):
+        powered("rapid", power_follows="controller")
+
+
+def test_a_language_without_such_a_statement_is_refused():
+    with pytest.raises(InputError, match=r'no statement .*write power_follows = "steps"'):
+        powered("urscript", power_follows="controller")
 
 
 @in_each

@@ -17,7 +17,9 @@ POWER = {
     "urscript": "power_output = 1\npower_full = 1.0\n",
     "linuxcnc": "power_output = 2\npower_full = 100.0\n",
     "csv": "",
+    "inform": "power_output = 3\npower_full = 10.0\n",
 }
+STEPS = [name for name in POWER if name != "inform"]
 """Settings of the power in each language that can set it along the path."""
 SETS = {
     "rapid": r"SetAO aoPower,(?P<value>[\d.]+)|AOp:=aoPower,(?P<other>[\d.]+)",
@@ -45,14 +47,34 @@ def job_text(name, more=CURVE):
     return text.replace(table, table + POWER[name]) if table in text else text
 
 
+LINE = (
+    'power_by_speed = [[0.0, 0.0], [1.0, 0.9]]\npierce_power = 0.55\npower_follows = "controller"\n'
+)
+BY_CONTROLLER = {
+    "rapid": r"TriggSpeed trFollow|SetAO aoPower,[1-9]|trFollow,|trFollowEnd|PowerEnd",
+    "krl": r"ANOUT|SIGNAL",
+    "inform": r"ARATION|ARATIOF|AOUT AO",
+}
+"""Lines about the power in each language whose controller sets it by the speed."""
+
+
 @pytest.fixture(scope="module")
 def subjects(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("power")
+    return made_subjects(tmp_path_factory.mktemp("power"), STEPS, CURVE)
+
+
+@pytest.fixture(scope="module")
+def by_controller(tmp_path_factory):
+    return made_subjects(tmp_path_factory.mktemp("controller"), BY_CONTROLLER, LINE)
+
+
+def made_subjects(folder, names, more):
+    """The job in each language with these lines of [program], planned once for each robot."""
     _draw(folder / "points.csv")
     plans, found = {}, {}
-    for name in POWER:
+    for name in names:
         path = folder / f"{name}.toml"
-        path.write_text(job_text(name))
+        path.write_text(job_text(name, more))
         audit = Audit.of(path)
         options, chosen = audit.expected.job.program, languages()[name]
         arm = ARMS.get(name, ARM)
@@ -72,7 +94,7 @@ def subjects(tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("name", POWER)
+@pytest.mark.parametrize("name", STEPS)
 def test_the_program_passes_and_reads_back(subjects, name):
     subject = subjects[name]
     assert subject.outcome(subject.files) == ("passed", "")
@@ -106,6 +128,16 @@ def lines_that_set(subject, name):
                     yield file, k, found
 
 
+SOME = 5
+"""About as many edits of each kind are tried in each language; all were, once."""
+
+
+def some(found):
+    """About `SOME` of what is found, the first and the last among them."""
+    found = list(found)
+    return [*found[:: max(1, len(found) // (SOME - 1))], *found[-1:]]
+
+
 def edited(subject, file, k, line):
     lines = subject.files[file].split("\n")
     lines[k : k + 1] = [] if line is None else [line]
@@ -118,10 +150,10 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize(
     "share", [pytest.param(0.8, marks=SLOW), 0.95, pytest.param(1.1, marks=SLOW)]
 )
-@pytest.mark.parametrize("name", POWER)
+@pytest.mark.parametrize("name", STEPS)
 def test_a_power_that_is_scaled_does_not_pass(subjects, name, share):
     subject, tried = subjects[name], 0
-    for file, k, found in lines_that_set(subject, name):
+    for file, k, found in some(lines_that_set(subject, name)):
         group = "value" if found["value"] else "other"
         value = float(found[group])
         if not value or (name == "urscript" and "movej" in found.string):
@@ -131,13 +163,13 @@ def test_a_power_that_is_scaled_does_not_pass(subjects, name, share):
         line = line[: found.start(group)] + scaled + line[found.end(group) :]
         assert subject.outcome(edited(subject, file, k, line))[0] != "passed", line
         tried += 1
-    assert tried >= 4
+    assert tried >= 2
 
 
-@pytest.mark.parametrize("name", POWER)
+@pytest.mark.parametrize("name", STEPS)
 def test_a_power_that_is_left_out_or_stays_on_does_not_pass(subjects, name):
     subject, tried = subjects[name], 0
-    for file, k, _ in lines_that_set(subject, name):
+    for file, k, _ in some(lines_that_set(subject, name)):
         line = subject.files[file].split("\n")[k]
         whole = re.fullmatch(
             r"\s*(\d+:)?\s*(SetAO .*|\$ANOUT.*|TRIGGER.*|AO\[.*|power_set.*|M6[78].*|\w+,power,.*)",
@@ -156,4 +188,30 @@ def test_a_power_that_is_left_out_or_stays_on_does_not_pass(subjects, name):
                 continue
         assert subject.outcome(without)[0] != "passed", line
         tried += 1
-    assert tried >= 4
+    assert tried >= 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BY_CONTROLLER)
+def test_a_power_by_the_controller_passes_and_no_edit_of_it_does(by_controller, name):
+    """Each line about it left out, and each number on it raised by half."""
+    subject, tried = by_controller[name], 0
+    assert subject.outcome(subject.files) == ("passed", "")
+    for file, text in subject.files.items():
+        for k, row in enumerate(text.split("\n")):
+            if not re.search(BY_CONTROLLER[name], row) or "VAR " in row:
+                continue
+            if "Trigg" not in row or "TriggSpeed" in row:
+                assert subject.outcome(edited(subject, file, k, None))[0] != "passed", row
+                tried += 1
+            numbers = () if "Trigg" in row and "TriggSpeed" not in row else re.finditer(
+                r"\d+\.\d\d*", row
+            )  # fmt: skip
+            for found in numbers:
+                if not float(found[0]):
+                    continue
+                more = f"{1.5 * float(found[0]):.{len(found[0].partition('.')[2])}f}"
+                line = f"{row[: found.start()]}{more}{row[found.end() :]}"
+                assert subject.outcome(edited(subject, file, k, line))[0] != "passed", line
+                tried += 1
+    assert tried >= 8

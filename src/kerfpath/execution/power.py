@@ -97,6 +97,8 @@ class PowerAlong:
         Share of the full power that the program sets.
     lit : (m,) bool
         Whether the laser is on; it is off along micro joints.
+    in_steps : bool
+        Whether the program sets the power in steps, or the controller by the speed.
     """
 
     s: Array
@@ -104,12 +106,15 @@ class PowerAlong:
     asked: Array
     set: Array
     lit: Bools
+    in_steps: bool = True
 
     __repr__ = short_repr
 
     @property
     def switches(self) -> int:
-        """How often the power changes within the cut."""
+        """How often the program changes the power within the cut."""
+        if not self.in_steps:
+            return 0
         return int((np.diff(self.set) != 0).sum())
 
     @property
@@ -140,12 +145,15 @@ def power_along(program: Program, section: Section, options: ProgramOptions) -> 
     share = shares_of(moves, speed)
     ways = [move.speed * move.duration for move in moves[1:]]
     lit = lit_of(moves)
+    in_steps = law.follows == "steps"
+    given = _beside_switches(law.steps(share), lit) if in_steps else law.proportional * share
     return PowerAlong(
         s=freeze(np.append(0.0, np.cumsum(ways))),
         speed=freeze(share),
         asked=freeze(law.at(share)),
-        set=freeze(_beside_switches(law.steps(share), lit)),
+        set=freeze(given),
         lit=lit,
+        in_steps=in_steps,
     )
 
 
@@ -202,8 +210,8 @@ def with_power(program: Program, options: ProgramOptions) -> Program:
     law = options.power
     if law is None:
         return program
-    if why := options.robot_language.no_power:
-        raise InputError(f"power_by_speed: {why}; leave it out, or use another language")
+    if why := options.robot_language.power_refusal(law.follows) or law.refusal():
+        raise InputError(why)
     sections = tuple(_with_power(program, s, law, options) for s in program.sections)
     return replace(program, sections=sections)
 
@@ -217,6 +225,17 @@ def _with_power(
     powers = dict(zip(cut, along.set.tolist(), strict=True))
     after = dict(pairwise([*cut, None]))
     pierces = any(isinstance(step, Wait) for step in section.steps)
+    if law.follows == "controller":
+        lead = options.lead_time if options.robot_language.ahead else 0.0
+        slope = law.proportional / max(move.speed for move in cut)
+        begin = SetPower(share=law.piercing if pierces else 0.0)
+        set_at: dict[Step, SetPower] = {
+            approach: begin,
+            cut[0]: SetPower(share=0.0, per_speed=slope, lead_time=lead),
+            retract: SetPower(share=0.0),
+        }
+        moved = ([*([set_at[s]] if s in set_at else []), s] for s in section.steps)
+        return replace(section, steps=tuple(step for some in moved for step in some))
     now = law.piercing if pierces else powers[cut[0]]
     steps: list[Step] = []
     for step in section.steps:

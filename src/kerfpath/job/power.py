@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath.arrays import Ints
+from kerfpath.arrays import Array, Ints
 from kerfpath.auditor import Check
 from kerfpath.execution import executed_speeds, lit_of, shares_of
 from kerfpath.job.audit_report import check, count, count_at
@@ -68,7 +68,6 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
             many > 0
         )
     odd = [node_of(ends, at) for at, _ in group.powers if at not in (0, 1, len(path) - 1)]
-    said = _in_moves(group)
     speed = executed_speeds(
         moves,
         job.robot,
@@ -76,14 +75,21 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
         T_base_part=job.placement,
         T_flange_tip=job.tool,
     )
-    cut = np.array(said[1:-1])
+    said, slope = _in_moves(group)
+    full = max(move.speed for move in moves[1:])
+    cut = said[1:-1] + slope[1:-1] * speed
     off = np.where(lit_of(path[:-1]), np.abs(cut - law.at(shares_of(moves, speed))), 0.0)
-    wrong = np.flatnonzero(np.abs(cut - law.nearest(cut)) > SAME_POWER)
+    if law.follows == "steps":
+        wrong = (np.abs(cut - law.nearest(cut)) > SAME_POWER) | (slope[1:-1] > 0)
+    else:
+        same = np.abs(slope[1:-1] * full - law.proportional) <= SAME_POWER
+        wrong = ~same | (said[1:-1] > 0)
     k = int(np.argmax(off))
     pierce = [abs(_while_waiting(group, wait.line) - law.piercing)
               for at, wait in group.waits if at == 1]  # fmt: skip
     lead = job.program.lead_time if job.program.robot_language.ahead else 0.0
     late = [abs(s.lead_time - lead) for _, s in switched]
+    late += [abs(power.lead_time - lead) for _, power in group.powers if power.per_speed]
     return [
         check(
             "power",
@@ -93,15 +99,15 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
             "share",
             int(ends[k]),
         ),
-        count_at("power-steps", "moves with a power that is none of the job's steps",
-                 [int(ends[i]) for i in wrong]),
+        count_at("power-steps", "moves whose power is not of the job's steps or line",
+                 [int(ends[i]) for i in np.flatnonzero(wrong)]),
         count_at("power-standing", "settings of the power where the robot moves", odd),
         check("power-pierce", "difference of the power at the pierce from the job's",
               max(pierce, default=0.0), SAME_POWER, "share"),
         check("power-lead", "difference of the power's lead time from the job's",
               max(late, default=0.0), SAME_LEAD, "s"),
-        check("power-off", "power while the tool backs off", said[-1], 0.0, "share",
-              int(ends[-1])),
+        check("power-off", "power while the tool backs off",
+              max(said[-1], slope[-1] * full), 0.0, "share", int(ends[-1])),
     ]  # fmt: skip
 
 
@@ -110,16 +116,16 @@ def node_of(ends: Ints, at: int) -> int:
     return int(ends[min(max(at - 1, 0), len(ends) - 1)])
 
 
-def _in_moves(group: ReadGroup) -> list[float]:
-    """Return the share of the full power in each move of the path."""
-    now, found = 0.0, []
+def _in_moves(group: ReadGroup) -> Array:
+    """Return the share of the power in each of m moves of the path, and for each m/s, (2, m)."""
+    now, found = (0.0, 0.0), []
     for k, move in enumerate(group.path):
         for at, power in group.powers:
-            now = power.share if at == k else now
+            now = (power.share, power.per_speed) if at == k else now
         found.append(now)
         for switch in move.switches:
-            now = now if switch.share is None else switch.share
-    return found
+            now = now if switch.share is None else (switch.share, 0.0)
+    return np.array(found).T
 
 
 def _while_waiting(group: ReadGroup, line: int) -> float:
@@ -127,5 +133,5 @@ def _while_waiting(group: ReadGroup, line: int) -> float:
     now = 0.0
     for at, power in group.powers:
         if at == 0 or (at == 1 and power.line < line):
-            now = power.share
+            now = power.share + power.per_speed
     return now

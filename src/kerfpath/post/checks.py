@@ -129,9 +129,10 @@ def _check_outputs(
 ) -> Iterator[ProgramIssue]:
     """Check that there is an output for everything that is switched; warn of assumed ones."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
-    if "power" in program.signals and language.no_power:
-        message = f"{language.no_power}; leave power_by_speed out, or use another language"
-        yield ProgramIssue("error", "power", message, "program")
+    follows = any(isinstance(step, SetPower) and step.per_speed for step in program.steps)
+    refusal = language.power_refusal("controller" if follows else "steps")
+    if "power" in program.signals and refusal:
+        yield ProgramIssue("error", "power", refusal, "program")
         return
     if getattr(settings, "power_output", None) is not None:
         if settings.power_full is None:  # type: ignore[attr-defined]  # it goes with the output
@@ -266,7 +267,9 @@ def _check_stays(section: Section) -> Iterator[ProgramIssue]:
                 yield ProgramIssue("error", "wait", f"a wait must last {message}", place)
             if not stands:
                 yield ProgramIssue("error", "wait", "a wait must follow a move that stops", place)
-        if isinstance(step, SetPower) and not (stands and 0 <= step.share <= 1):
+        if isinstance(step, SetPower) and not (
+            stands and 0 <= step.share <= 1 and 0 <= step.per_speed < np.inf
+        ):
             message = "a power must be a share from 0 to 1, and follow a move that stops"
             yield ProgramIssue("error", "power", message, place)
         if isinstance(step, Request | Await) and (on or not stands):
@@ -300,7 +303,7 @@ def _check_power(section: Section) -> Iterator[ProgramIssue]:
         place = f"{section.name}, step {index}"
         if isinstance(step, JointMove) and share > 0:
             yield ProgramIssue("error", "power", "the power is on during a joint move", place)
-        share = step.share if isinstance(step, SetPower) else share
+        share = max(step.share, step.per_speed) if isinstance(step, SetPower) else share
         for switch in switches_of(step):
             said = switch.share if switch.signal == "power" else None
             if (said is None) == (switch.signal == "power"):

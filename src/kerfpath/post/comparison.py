@@ -585,12 +585,12 @@ def _compare_powers(
 ) -> Iterator[Difference]:
     """Compare the power that is set while the robot stands."""
     for a, b in groups:
-        one, two = ([(k, power.share) for k, power in group.powers] for group in (a, b))
+        one, two = a.powers, b.powers
         same = len(one) == len(two) and all(
-            k == j and abs(x - y) <= POWER for (k, x), (j, y) in zip(one, two, strict=True)
+            k == j and _same_power(x, y) for (k, x), (j, y) in zip(one, two, strict=True)
         )
         if not same:
-            shares = ([f"{share:.1%}" for _, share in each] for each in (one, two))
+            shares = ([_power(power) for _, power in each] for each in (one, two))
             words = (", ".join(each) or "none" for each in shares)
             said = " and ".join(f"{w} in {name}" for w, name in zip(words, names, strict=True))
             there = [power.place for _, power in b.powers]
@@ -679,8 +679,8 @@ def deviations(
             if abs(step.time - back.time) > LEAD:
                 issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
         elif isinstance(step, SetPower) and isinstance(back, ReadPower):
-            if abs(step.share - back.share) > POWER:
-                message = f"the power is {back.share:.1%}, expected {step.share:.1%}"
+            if not _same_power(step, back):
+                message = f"the power is {_power(back)}, expected {_power(step)}"
                 issues.append(_issue(back, message))
         elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
             if step != back.what:
@@ -743,6 +743,18 @@ def switches_in_words(switches: Iterable[Switch]) -> str:
         for s in switches
     ]
     return " and ".join(words) or "nothing"
+
+
+def _same_power(a: SetPower | ReadPower, b: SetPower | ReadPower) -> bool:
+    """Return whether two settings of the power are the same, but for digits."""
+    near = abs(a.per_speed - b.per_speed) <= POWER * max(a.per_speed, b.per_speed)
+    near = near and abs(a.lead_time - b.lead_time) <= LEAD
+    return near and abs(a.share - b.share) <= POWER
+
+
+def _power(power: SetPower | ReadPower) -> str:
+    """Return a setting of the power in words."""
+    return f"{power.per_speed:.1%} for each m/s" if power.per_speed else f"{power.share:.1%}"
 
 
 def _state(switch: Switch) -> str:

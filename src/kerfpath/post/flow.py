@@ -87,8 +87,8 @@ class _Routine:
                     yield late, state - {ANSWER + partner}
             case ReadHandshake(what=Request(partner=partner, on=True)):
                 yield at + 1, state | {_output(partner)}
-            case ReadPower(share=share):
-                yield at + 1, state | {POWER} if share > 0 else state - {POWER}
+            case ReadPower(share=share, per_speed=slope):
+                yield at + 1, state | {POWER} if max(share, slope) > 0 else state - {POWER}
             case ReadHandshake(what=Request(partner=output)) | ReadOff(output=output):
                 yield at + 1, _switched_off(state, output)
             case _:

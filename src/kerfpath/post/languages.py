@@ -19,6 +19,7 @@ from kerfpath.arrays import Array, short_repr
 from kerfpath.auditor import Level
 from kerfpath.errors import InputError
 from kerfpath.names import LONGEST_NAME, identifiers
+from kerfpath.post.power import PowerFollows
 from kerfpath.post.program import (
     PARTNERS,
     SIGNALS,
@@ -533,6 +534,10 @@ class Formatter(ABC):
             )
         return name
 
+    def power_per_speed(self, power: SetPower) -> float:
+        """Return the value of the power output for each m/s of the tip."""
+        return float(power.per_speed * self.settings.power_full)
+
     def power_value(self, share: float | None, decimals: int = 4) -> str:
         """Return the value of the power output at a share of the full power."""
         return number((share or 0.0) * self.settings.power_full, decimals)
@@ -723,6 +728,8 @@ class Language:
         (m,) s. None: as `kerfpath.execution` models it.
     no_power : str
         Why programs cannot set the power along the path; empty if they can.
+    follows_speed : bool
+        Whether it has a statement by which the controller sets the power by the speed.
     externals : callable, optional
         (robot, settings) -> what is missing or wrong in the settings for the robot's external axes
         and coordinated motion, as sentences. None: the language has no external axes.
@@ -755,6 +762,7 @@ class Language:
     zones: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     no_power: str = ""
+    follows_speed: bool = False
     durations: Callable[[Robot, Array, Array, Any], Array] | None = None
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
     encodings: tuple[str, ...] = ("utf-8-sig",)
@@ -816,6 +824,16 @@ class Language:
             f"axis 3 of {robot.id!r} measures (no arm of the library has its lengths); add to "
             "[robot] " + ", or ".join(ways[way] for way in self.axis_3 if way)
         )
+
+    def power_refusal(self, follows: PowerFollows) -> str:
+        """Return why no program in this language can set the power so; empty if one can."""
+        if follows == "controller" and not self.follows_speed:
+            other = "leave power_by_speed out" if self.no_power else 'write power_follows = "steps"'
+            return f"{self.title} has no statement by which the power follows the speed; {other}"
+        if follows == "steps" and self.no_power:
+            other = 'write power_follows = "controller"' if self.follows_speed else "leave it out"
+            return f"power_by_speed: {self.no_power}; {other}, or use another language"
+        return ""
 
     def doubt(self, robot: Robot) -> str:
         """Return why a robot may not understand this language; empty if it does."""

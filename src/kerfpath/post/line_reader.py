@@ -422,6 +422,13 @@ class LineReader:
         self.require_stopped("a power")
         self.add(ReadPower, share=self.power_share(output, value))
 
+    def follow_speed(self, output: object, per_speed: float, lead_time: float = 0.0) -> None:
+        """Add that the controller sets the power: a value of its output for each m/s."""
+        self.require_stopped("a power")
+        share = self.power_share(output, "0")
+        slope = per_speed / float(self.settings.power_full)
+        self.add(ReadPower, share=share, per_speed=slope, lead_time=lead_time)
+
     def power_off(self, output: object) -> None:
         """Add that the power is set to 0, whatever it is."""
         self.require_power_output(output)

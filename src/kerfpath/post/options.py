@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
 from kerfpath.post.arcs import Zone
 from kerfpath.post.languages import Language, LanguageSettings, Rules, language, plain
-from kerfpath.post.power import PowerBySpeed, PowerCurve, power_curve
+from kerfpath.post.power import PowerBySpeed, PowerCurve, PowerFollows, power_curve
 from kerfpath.post.program import Handshake
 from kerfpath.setting import check, documented, setting
 
@@ -33,6 +33,7 @@ class ProgramKeywords(TypedDict, total=False):
     remarks: Sequence[str]
     power_by_speed: PowerCurve | None
     power_step: float
+    power_follows: PowerFollows
     pierce_power: float | None
 
 
@@ -174,6 +175,13 @@ class ProgramOptions:
         most=0.5,
         example="0.1",
     )
+    power_follows: PowerFollows = setting(
+        "steps",
+        "who sets the power along the path: the program in steps, or the controller in proportion "
+        "to the speed that it measures, for which the curve has to be a straight line from 0",
+        what="steps or controller",
+        example='"steps"',
+    )
     pierce_power: float | None = setting(
         None,
         "share of the full power while the beam pierces; none: that of the full speed",
@@ -221,8 +229,12 @@ class ProgramOptions:
         """How the power follows the speed; None if no program sets it."""
         if self.power_by_speed is None:
             return None
-        law = PowerBySpeed(curve=self.power_by_speed, step=self.power_step)
-        return law if self.pierce_power is None else replace(law, pierce=self.pierce_power)
+        return PowerBySpeed(
+            curve=self.power_by_speed,
+            step=self.power_step,
+            pierce=self.pierce_power,
+            follows=self.power_follows,
+        )
 
     @property
     def rules(self) -> Rules:

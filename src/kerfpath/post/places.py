@@ -298,6 +298,7 @@ def issues_before_planning(
     title = identifier(options.name)
     names = identifiers((cut for cut, _ in cuts), taken=(title,))
     here, q = np.eye(4), np.zeros(robot.joints)
+    per_speed = float(options.power_follows == "controller")
     radius = SOME_ZONE if options.zone == "auto" else options.zone
     sections = []
     for section, (_, speed) in zip(names, cuts, strict=True):
@@ -310,7 +311,7 @@ def issues_before_planning(
         steps = (
             JointMove(q=q, speed=1.0),
             *options.handshakes,
-            *([] if options.power is None else [SetPower(share=0.0)]),
+            *([] if options.power is None else [SetPower(share=0.0, per_speed=per_speed)]),
             LinearMove(
                 T_part_tip=here,
                 q=q,

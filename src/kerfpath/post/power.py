@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from kerfpath.errors import InputError
 
 PowerCurve = tuple[tuple[float, float], ...]
 """Pairs of a share of the programmed speed and a share of the full power, by rising speed."""
+PowerFollows = Literal["steps", "controller"]
+"""Whether the program sets the power in steps, or the controller by the speed that it measures."""
 MARGIN = 0.25
 """Share of a step by which the curve passes the border to the next before the power follows."""
 
@@ -59,11 +62,14 @@ class PowerBySpeed:
         Step of the power, a share of the full power; one of the steps is the power at full speed.
     pierce : float or None
         Share of the full power while the beam pierces; None: that of the full speed.
+    follows : {"steps", "controller"}
+        A controller sets the power in proportion to the speed.
     """
 
     curve: PowerCurve
     step: float
     pierce: float | None = None
+    follows: PowerFollows = "steps"
 
     __repr__ = short_repr
 
@@ -81,6 +87,31 @@ class PowerBySpeed:
     def tolerance(self) -> float:
         """Largest difference of a step from the curve, a share of the full power."""
         return (0.5 + MARGIN) * self.step
+
+    @property
+    def proportional(self) -> float:
+        """The share at full speed of the power in proportion to the speed nearest to the curve."""
+        pairs = [(v, p) for v, p in self.curve if v > 0]
+        slopes = [(p + r) / (v + w) for v, p in pairs for w, r in pairs]
+        return min(min(slope, 1.0) for slope in slopes if self._off(slope) == self._least(slopes))
+
+    def _off(self, slope: float) -> float:
+        """Return the largest difference of a power in proportion to the speed from the curve."""
+        return max(abs(min(slope, 1.0) * v - p) for v, p in self.curve)
+
+    def _least(self, slopes: Sequence[float]) -> float:
+        return min(map(self._off, slopes))
+
+    def refusal(self) -> str:
+        """Return why no controller can follow the curve; empty if one can."""
+        off = self._off(self.proportional)
+        if self.follows == "steps" or off <= self.tolerance:
+            return ""
+        return (
+            "power_by_speed: a controller sets the power in proportion to the speed, which is "
+            f"{off:.1%} of the full power off the curve, allowed {self.tolerance:.1%}; write a "
+            'straight line from [0, 0], or power_follows = "steps"'
+        )
 
     def at(self, speed: Array) -> Array:
         """Return the shares of the full power at shares (m,) of the programmed speed."""

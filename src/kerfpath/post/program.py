@@ -186,9 +186,16 @@ class SetPower:
     ----------
     share : float
         Share of the full power, from 0 to 1.
+    per_speed : float s/m
+        Share of the full power for each m/s of the tip, by which the controller itself sets it from
+        the next move on; `share` is 0 then. 0: the power stays.
+    lead_time : float s
+        How far ahead of the speed the controller sets it then.
     """
 
     share: float
+    per_speed: float = 0.0
+    lead_time: float = 0.0
 
     __repr__ = short_repr
 

@@ -121,9 +121,15 @@ class ReadHandshake(_InFile):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadPower(_InFile):
-    """The power is set to a share of the full power while the robot is stopped."""
+    """The power is set to a share of the full power while the robot is stopped.
+
+    With `per_speed` (s/m), the controller sets that share for each m/s from the next move on, by
+    `lead_time` (s) ahead of the speed.
+    """
 
     share: float
+    per_speed: float = 0.0
+    lead_time: float = 0.0
 
     __repr__ = short_repr
 

@@ -40,6 +40,7 @@ INFORM = Language(
     longest_line=250,
     inherited=inherited,
     no_power="INFORM switches outputs only where the robot stands, so no power follows the speed",
+    follows_speed=True,
     read=read,
 )
 """The language as registered."""

@@ -28,6 +28,7 @@ from kerfpath.post.languages import (
     Inherited,
     OrientationSetting,
     PortSettings,
+    PowerFull,
     Rules,
     ShortestMove,
     numbered,
@@ -71,6 +72,7 @@ def _not_zero(values: list[float]) -> list[float]:
 
 Output = Annotated[int | None, numbered("an output", 4096)]
 Input = Annotated[int | None, numbered("an input", 4096)]
+Analogue = Annotated[int | None, numbered("an analogue output", 40)]
 
 
 class InformSettings(PortSettings, output=Output, input=Input):
@@ -79,6 +81,8 @@ class InformSettings(PortSettings, output=Output, input=Input):
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
+    power_output: Analogue = None
+    power_full: PowerFull = None
     user_frame: Annotated[int, setting("a user frame, 1 to 63", "2", ge=1, le=63)] = 1
     tool_number: Annotated[int, setting("a tool, 0 to 63", "2", ge=0, le=63)] = 0
     pulses_per_deg: Annotated[

@@ -61,13 +61,17 @@ _JOB = patterns(
         "joint": r"MOVJ C(\d{5}) VJ=(\d+(?:\.\d+)?) PL=(\d)",
         "switch": r"DOUT OT#\((\d+)\) (ON|OFF)",
         "wait": r"TIMER T=(\d+\.\d\d)",
+        "aration": r"ARATION AO#\((\d+)\) BV=(\d+\.\d+) V=(\d+\.\d) OFV=0\.00",
+        "aratiof": r"ARATIOF AO#\((\d+)\)",
+        "set_power": r"AOUT AO#\((\d+)\) (\d+\.\d+)",
         "remark": r"'.*",
         "wait_for": r"\*WAIT(\d+)",
     }
 )
 _WITHOUT_ANSWER = patterns(
     {
-        "": r"WAIT IN#\(\d+\)=ON T=\d+\.\d\d",
+        "": r"WAIT IN#\(\d+\)=ON T=\d+\.\d\d|ARATIOF AO#\(\d+\)",
+        "power_off": r"AOUT AO#\((\d+)\) 0\.00",
         "jump_if_on": r"JUMP \*(\w+) IF IN#\((\d+)\)=ON",
         "off": r"DOUT OT#\((\d+)\) OFF",
         "pause": "PAUSE",
@@ -251,7 +255,10 @@ class _Job(_Text):
             self._read_poses(count)
         self.require_rows(after)
         self.require_next(reset_lines(inherited(settings)))
+        self.follows = False
         self.instructions(_JOB)
+        if self.follows:
+            raise self.fault("expected ARATIOF before the end")
         if self.arc_poses:
             raise self.fault("an arc needs three MOVC, one after the other")
 
@@ -358,6 +365,23 @@ class _Job(_Text):
         if not self.stands or last is None:
             raise self.fault("a switch must follow a move of the path with PL=0")
         self.add_switch(last, Switch(signal=self.signal(int(output)), on=on), self.place)
+
+    def set_power(self, output: str, value: str) -> None:
+        if self.follows:
+            raise self.fault("expected ARATIOF before this line")
+        self.power(int(output), value)
+
+    def aration(self, output: str, value: str, speed_mm_s: str) -> None:
+        if self.follows or float(speed_mm_s) <= 0:
+            raise self.fault("expected one ARATION at a time, with a speed above 0")
+        self.follow_speed(int(output), float(value) / (1e-3 * float(speed_mm_s)))
+        self.follows = True
+
+    def aratiof(self, output: str) -> None:
+        self.require_power_output(int(output))
+        if not self.follows:
+            raise self.fault("expected ARATION before this line")
+        self.follows = False
 
     def wait_for(self, label: str) -> None:
         _, below = (*self.rows[self.row + 1 : self.row + 2], (0, ""))[0]

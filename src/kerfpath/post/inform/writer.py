@@ -38,6 +38,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    SetPower,
     Step,
     Wait,
     asked_in,
@@ -81,7 +82,10 @@ def middle(
 
 def switch_off_lines(settings: InformSettings) -> list[str]:
     """Return the instructions that switch off everything that the settings name."""
-    return [f"DOUT OT#({output}) OFF" for output in outputs(settings)]
+    off = [f"DOUT OT#({output}) OFF" for output in outputs(settings)]
+    if (power := settings.power_output) is not None:
+        off += [f"ARATIOF AO#({power})", f"AOUT AO#({power}) 0.00"]
+    return off
 
 
 def wait_lines(
@@ -120,6 +124,7 @@ class Inform(CalledFormatter):
         super().__init__(split_by_kind(stop_to_switch(program)), settings)
         self._targets: list[tuple[Array, Array | None]] = []
         self._labels = count(1)
+        self._follows = False
         self._external = ExternalPulses(program.robot, settings)
         moves = self.program.moves
         self._before = dict(zip(moves[1:], moves, strict=False))
@@ -166,7 +171,7 @@ class Inform(CalledFormatter):
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the instructions of a section, its positions numbered from 0."""
-        self._targets, self._labels = [], count(1)
+        self._targets, self._labels, self._follows = [], count(1), False
         yield from reset_lines(inherited(self.settings))
         yield from super().lines(section)
 
@@ -214,6 +219,23 @@ class Inform(CalledFormatter):
     def wait(self, wait: Wait) -> Iterator[str]:
         """Yield a TIMER."""
         yield f"TIMER T={number(wait.time, 2)}"
+
+    def power(self, power: SetPower) -> Iterator[str]:
+        """Yield an AOUT; the robot is stopped.
+
+        A power that follows the speed is set by the controller, from ARATION to ARATIOF.
+        """
+        port = f"AO#({self.output('power')})"
+        if power.per_speed:
+            full = float(self.settings.power_full or 0.0)
+            speed = number(1e3 * full / self.power_per_speed(power), 1)
+            yield f"ARATION {port} BV={number(full, 2)} V={speed} OFV=0.00"
+            self._follows = True
+            return
+        if self._follows:
+            yield f"ARATIOF {port}"
+        self._follows = False
+        yield f"AOUT {port} {self.power_value(power.share, 2)}"
 
     def request(self, request: Request) -> Iterator[str]:
         """Yield a DOUT; the robot is stopped."""

@@ -36,6 +36,7 @@ KRL = Language(
     encodings=("utf-8-sig", "cp1252"),
     longest_line=250,
     inherited=inherited,
+    follows_speed=True,
     read=read,
 )
 """The language as registered."""

@@ -19,6 +19,7 @@ from kerfpath.post.krl.writer import (
     FIRST,
     HEAD,
     PASSED,
+    POWER,
     SWITCH_OFF,
     TIMER,
     data_list,
@@ -53,6 +54,9 @@ _LINES = patterns(
         "share": r"BAS\(#VEL_PTP,(\d+)\)",
         "trigger": r"TRIGGER WHEN PATH=0 DELAY=(-?\d+) DO \$OUT\[(\d+)\]=(TRUE|FALSE)",
         "power_trigger": r"TRIGGER WHEN PATH=0 DELAY=(-?\d+) DO \$ANOUT\[(\d+)\]=(\d+\.?\d*)",
+        "signal_of_power": rf"SIGNAL {POWER} \$ANOUT\[(\d+)\]",
+        "anout_on": rf"ANOUT ON {POWER}=(\d+\.?\d*)\*\$VEL_ACT DELAY=-(\d+\.?\d*)",
+        "anout_off": rf"ANOUT OFF {POWER}",
         "set_power": r"\$ANOUT\[(\d+)\]=(\d+\.?\d*)",
         "wait": rf"WAIT SEC {_NUMBER}",
         "condition": rf"IF ({FIRST}|{PASSED})<=(\d+) THEN",
@@ -78,7 +82,7 @@ _IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
     "linear", "speed", "zone", "trigger", "power_trigger", "circular", "joint", "share", "wait",
-    "set_power", "request",
+    "set_power", "signal_of_power", "anout_on", "anout_off", "request",
     "guarded", "wait_for", "timer", "end",
 )  # fmt: skip
 _WITHOUT_ANSWER = patterns(
@@ -160,6 +164,7 @@ class _File(LineReader):
         self.held: dict[str, float] = {}
         self.held_at: dict[str, str] = {}
         self.switches: tuple[Switch, ...] = ()
+        self.follows = self.power_named = False
         for _ in self.rows:
             self.read_line(self.advance())
         self.line = len(lines) + 1
@@ -220,9 +225,12 @@ class _File(LineReader):
         elif passed:
             self.require_next([f"INT {PASSED}"])
         self.inside, self.held = True, {}
+        self.follows = self.power_named = False
 
     def end(self) -> None:
         self.require_opening()
+        if self.follows:
+            raise self.fault(f"expected ANOUT OFF {POWER} before this line")
         if self.condition_open:
             raise self.fault("ENDIF is missing")
         if self.is_main and len(self.routines) == 1 and not self.begins_again:
@@ -342,7 +350,26 @@ class _File(LineReader):
         self.switches += (self.power_switch(int(output), value, self.lead_of(delay_ms)),)
 
     def set_power(self, output: str, value: str) -> None:
+        if self.follows:
+            raise self.fault(f"expected ANOUT OFF {POWER} before this line")
         self.power(int(output), value)
+
+    def signal_of_power(self, output: str) -> None:
+        if self.steps or self.power_named:
+            raise self.fault("a signal must be declared once, at the start of a routine")
+        self.require_power_output(int(output))
+        self.power_named = True
+
+    def anout_on(self, per_speed: str, lead_time: str) -> None:
+        if self.follows or not self.power_named:
+            raise self.fault(f"expected SIGNAL {POWER} at the start, and one ANOUT ON at a time")
+        self.follow_speed(self.settings.power_output, float(per_speed), float(lead_time))
+        self.follows = True
+
+    def anout_off(self) -> None:
+        if not self.follows:
+            raise self.fault(f"expected ANOUT ON {POWER} before this line")
+        self.follows = False
 
     def lead_of(self, delay_ms: str) -> float:
         """Return the lead time (s) of a trigger."""
@@ -352,6 +379,8 @@ class _File(LineReader):
         return -int(delay_ms) * 1e-3
 
     def joint(self, *fields: str) -> None:
+        if self.follows:
+            raise self.fault(f"expected ANOUT OFF {POWER} before this line")
         *axes_deg, external = fields
         axes = np.radians([[float(axis) for axis in axes_deg]])
         speed = self.holds("share", "BAS(#VEL_PTP,...)")

@@ -70,6 +70,8 @@ PASSED = "first"
 """The same number, as the parameter of a called file."""
 SWITCH_OFF = "switch_off"
 """The routine that switches everything off."""
+POWER = "power_out"
+"""The analogue output of the power in a routine where it follows the speed."""
 INTERRUPT = 20
 TIMER = 20
 """The interrupt and the timer that are used; KUKA's own programs use others."""
@@ -159,9 +161,11 @@ class Krl(Formatter):
     def __init__(self, program: Program, settings: KrlSettings) -> None:
         named = replace(program, name=program.name[:LONGEST_NAME])
         super().__init__(
-            rename_sections(named, (FIRST, PASSED, SWITCH_OFF), longest_name=LONGEST_NAME), settings
+            rename_sections(named, (FIRST, PASSED, SWITCH_OFF, POWER), longest_name=LONGEST_NAME),
+            settings,
         )
         self._held: dict[str, str] = {}
+        self._follows = False
         self._target = self._target_texts()
         self._files = self._in_one_file() or self._in_more_files()
 
@@ -185,12 +189,16 @@ class Krl(Formatter):
             (FIRST, "the number of the first contour"),
             (PASSED, "the number of the first contour"),
             (SWITCH_OFF, "the routine that switches off"),
+            (POWER, "the output of the power"),
             *((section.name, "a contour") for section in self.program.sections),
         ]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of a section, which uses no values from the one before."""
         self._held.clear()
+        self._follows = False
+        if any(isinstance(step, SetPower) and step.per_speed for step in section.steps):
+            yield f"SIGNAL {POWER} $ANOUT[{self.output('power')}]"
         yield from super().lines(section)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
@@ -211,7 +219,18 @@ class Krl(Formatter):
         yield f"WAIT SEC {number(wait.time, 3)}"
 
     def power(self, power: SetPower) -> Iterator[str]:
-        """Yield an assignment; the robot is stopped."""
+        """Yield an assignment; the robot is stopped.
+
+        A power that follows the speed is set by the controller until the next assignment.
+        """
+        if power.per_speed:
+            slope, ahead = number(self.power_per_speed(power), 6), number(power.lead_time, 3)
+            yield f"ANOUT ON {POWER}={slope}*$VEL_ACT DELAY=-{ahead}"
+            self._follows = True
+            return
+        if self._follows:
+            yield f"ANOUT OFF {POWER}"
+        self._follows = False
         yield f"$ANOUT[{self.output('power')}]={self.power_value(power.share, 5)}"
 
     def request(self, request: Request) -> Iterator[str]:

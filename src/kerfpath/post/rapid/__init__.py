@@ -24,6 +24,7 @@ RAPID = Language(
     externals=missing,
     encodings=("utf-8-sig", "cp1252"),
     inherited=inherited,
+    follows_speed=True,
     read=read,
 )
 """The language as registered."""

@@ -27,6 +27,7 @@ from kerfpath.post.rapid.controller import (
 )
 from kerfpath.post.rapid.writer import (
     FIRST,
+    FOLLOW_END,
     FULL_AIR_SPEED,
     air_speed_data,
     ending_lines,
@@ -107,6 +108,8 @@ _LINES = patterns(
         "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "set_power_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\AOp:={_NAME},([\d.]+);",
+        "set_follow": rf"TriggSpeed {_NAME},0(\\Start)?,([\d.]+),{_NAME},([\d.]+)"
+        r"(?:\\DipLag:=([\d.]+))?;",
         "power": rf"SetAO {_NAME},([\d.]+);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
@@ -133,6 +136,7 @@ IN_MAIN = only(
     "activate",
     "set_trigger",
     "set_power_trigger",
+    "set_follow",
     "load",
     "condition",
     "late_call",
@@ -197,6 +201,9 @@ class _Reader(Aggregates):
         self.said_at: dict[str, str] = {}
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
+        self.follows: dict[str, tuple[float, float]] = {}
+        """Value of the power output for each m/s, and lead time, by the name of a trigger."""
+        self.following = ""
         self.called_in: dict[str, str] = {}
         self.routines: dict[str, list[FlowStep]] = {}
         self.switch_off: list[FlowStep] = []
@@ -236,6 +243,8 @@ class _Reader(Aggregates):
             self.read(line, IN_MAIN if in_main else IN_ROUTINE)
 
     def admit(self, kind: str) -> None:
+        if self.following and kind not in ("switching_move", "switching_arc"):
+            raise self.fault(f"expected a move with {self.following}, or {FOLLOW_END} before")
         if kind in DECLARED and self.routines:
             raise self.fault("data must be declared before the first routine")
 
@@ -373,6 +382,18 @@ class _Reader(Aggregates):
         self.said_at[name] = self.place
         self.triggers[name] = switch
 
+    def set_follow(
+        self, name: str, start: str | None, lead: str, output: str, slope: str, dip: str | None
+    ) -> None:
+        """Read a trigger by which the power follows the speed, or the end of that."""
+        per_speed = float(slope)
+        if name not in self.triggers or name in self.follows or self.called_in:
+            raise self.fault(f"{name} must be declared once and set once, before any contour")
+        if bool(start) != (per_speed > 0) or bool(dip) != bool(start) or (dip or lead) != lead:
+            raise self.fault(r"expected 0\Start, a scale and the same \DipLag, or 0 and scale 0")
+        self.require_power_output(output)
+        self.follows[name] = per_speed * 1e3, float(lead)
+
     def activate(self, state: str, unit: str) -> None:
         if (state == "Act") == bool(self.called_in):
             raise self.fault(
@@ -482,12 +503,34 @@ class _Reader(Aggregates):
     def add_triggers(self, text: str) -> None:
         """Add the switches of the triggers of a move; `text` names the triggers."""
         words = re.split(r"\\T\d:=", text, flags=re.IGNORECASE)
-        first, *_ = names = [self.spelled(word) for word in words]
+        names = [self.spelled(word) for word in words]
+        found = [name for name in names if name in self.follows]
+        if found or self.following:
+            self.add_follow(found)
+            names = [name for name in names if name not in self.follows]
+        first = names[0] if names else ""
         for name in names:
             switch = self.triggers.get(name)
             if switch is None:
                 raise self.fault(f"{name} has not been set")
             self.add_switch(self.last(), switch, self.said_at[first])
+
+    def add_follow(self, names: list[str]) -> None:
+        """Add that the power follows the speed from the last move on, or up to its end."""
+        name, *end = [*names, ""] if len(names) < 2 else names
+        per_speed, lead = self.follows.get(name, (0.0, 0.0))
+        if not per_speed or (self.following or name) != name:
+            raise self.fault(f"expected the trigger {self.following or 'of a power by the speed'}")
+        if not self.following:
+            move = self.steps.pop()
+            before = [step for step in self.steps if isinstance(step, ReadMove)][-1:]
+            if not before or before[0].zone != 0:
+                raise self.fault("a power may follow the speed only from a stop on")
+            self.follow_speed(self.settings.power_output, per_speed, lead)
+            self.steps.append(move)
+        self.following = "" if end == [FOLLOW_END] else name
+        if any(end) and (end != [FOLLOW_END] or self.follows.get(FOLLOW_END) != (0.0, lead)):
+            raise self.fault(f"expected {FOLLOW_END} alone beside {name}")
 
     def require_frames(self, tool: str, work_object: str) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]

@@ -63,6 +63,8 @@ JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "],"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d],"
 NO_POSE = np.eye(4)
 """Placeholder for the pose of a joint move."""
+FOLLOW_END = "trFollowEnd"
+"""Trigger at the end of a cut whose power follows the speed."""
 FIRST = "nFirst"
 """Number of the contour at which the program begins, for a restart."""
 
@@ -98,6 +100,22 @@ class Rapid(Formatter):
             for on, suffix in ((True, "On"), (False, "Off")):
                 keys = (s for s in switches if (s.signal, s.on) == (signal, on))
                 self.trigger |= _number_names(f"{prefix}{suffix}", keys)
+
+        self.follow = _number_names("trFollow", (p for s in self._powers() for p in s.values()))
+        self._following = {m: self.follow[p] for s in self._powers() for m, p in s.items()}
+        self._last = {[*moves][-1] for moves in self._powers() if moves}
+
+    def _powers(self) -> Iterator[dict[LinearMove, SetPower]]:
+        """Yield the moves of each section in which the power follows the speed."""
+        for section in self.program.sections:
+            found: dict[LinearMove, SetPower] = {}
+            power: SetPower | None = None
+            for step in section.steps:
+                if isinstance(step, SetPower):
+                    power = step if step.per_speed else None
+                elif isinstance(step, LinearMove) and power is not None:
+                    found[step] = power
+            yield found
 
     def files(self) -> dict[str, str]:
         """Return one module, or a main module and those with the routines that it loads.
@@ -148,7 +166,7 @@ class Rapid(Formatter):
         yield f"  PERS wobjdata {settings.work_object}:={self._work_object()};"
         yield from (f"  CONST speeddata {name}:={value};" for value, name in self._speed_data())
         yield from (f"  CONST zonedata {name}:={value};" for value, name in self.zone.items())
-        yield from (f"  VAR triggdata {name};" for name in self.trigger.values())
+        yield from (f"  VAR triggdata {name};" for name in self._trigger_names())
         yield f"  PERS num {FIRST}:=1;"
         yield ""
         yield "  PROC main()"
@@ -185,6 +203,18 @@ class Rapid(Formatter):
                 to = rf"\AOp:={self.output(s.signal)},{self.power_value(s.share)}"
             yield rf"TriggIO {name},{lead}\Time{to};"
 
+        for power, name in self.follow.items():
+            lead, slope = number(power.lead_time, 4), number(self.power_per_speed(power) * 1e-3, 6)
+            lag = rf"{lead},{self.output('power')},{slope}\DipLag:={lead}"
+            yield rf"TriggSpeed {name},0\Start,{lag};"
+        if self.follow:
+            lead = number(next(iter(self.follow)).lead_time, 4)
+            yield f"TriggSpeed {FOLLOW_END},0,{lead},{self.output('power')},0;"
+
+    def _trigger_names(self) -> list[str]:
+        end = [FOLLOW_END] if self.follow else []
+        return [*self.trigger.values(), *self.follow.values(), *end]
+
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the module, with what it names."""
         settings = self.settings
@@ -205,7 +235,7 @@ class Rapid(Formatter):
             *((section.name, "a contour") for section in self.program.sections),
             *((name, "a speed") for _, name in self._speed_data()),
             *((name, "a zone") for name in self.zone.values()),
-            *((name, "a switch") for name in self.trigger.values()),
+            *((name, "a switch") for name in self._trigger_names()),
             *((name[:-4], "a module") for name in list(self.files())[1:]),
         ]
 
@@ -237,8 +267,9 @@ class Rapid(Formatter):
         yield f"WaitTime {number(wait.time, 3)};"
 
     def power(self, power: SetPower) -> Iterator[str]:
-        """Yield a SetAO; the robot is stopped."""
-        yield f"SetAO {self.output('power')},{self.power_value(power.share)};"
+        """Yield a SetAO; the robot is stopped. A power by the speed is a trigger of the moves."""
+        if not power.per_speed:
+            yield f"SetAO {self.output('power')},{self.power_value(power.share)};"
 
     def request(self, request: Request) -> Iterator[str]:
         """Yield a SetDO; the robot is stopped."""
@@ -290,6 +321,8 @@ class Rapid(Formatter):
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
         names = [self.trigger[s] for s in move.switches if not s.needs]
+        names = [*([self._following[move]] if move in self._following else []), *names]
+        names += [FOLLOW_END] if move in self._last else []
         later = "".join(rf"\T{i}:={name}" for i, name in enumerate(names[1:], 2))
         return (f"Trigg{path}", f",{names[0]}{later}") if names else (f"Move{path}", "")
 
