@@ -32,8 +32,8 @@ TARGET = 60.0
 CLOCKS = {
     "compiling": ("kerfpath.cli.plan_output", "compile_kernels"),
     "reading the STEP file": ("kerfpath.cli.plan_output", "drawing_of"),
-    "planning and audit": ("kerfpath.job.run.job", "cut_candidate"),
-    "order and air moves": ("kerfpath.job.run.job", "order_cuts"),
+    "planning": ("kerfpath.job.run.job", "plan_candidate"),
+    "order, air moves and audit": ("kerfpath.job.run.job", "order_cuts"),
     "writing": ("kerfpath.cli.plan_output", "write_result"),
 }
 PARTS = ("import", *CLOCKS, "other")

@@ -186,6 +186,9 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
 # -----------------------------------------------------------------------------
 # Plan the whole part.
 
+LONGER = 1e-3
+"""Relative extra time up to which an order is kept although the final form of its candidates is not
+the one that it was found with."""
 FEW = 9
 """Nodes of a contour at which a posture needs a pose for the contour to be tried in it."""
 T = TypeVar("T")
@@ -444,7 +447,7 @@ class PlannedCuts(Protocol[T]):
         ...
 
     def settled(self, one: T) -> T | None:
-        """Return a quickly planned or turned candidate that an order has chosen in its final form.
+        """Return a candidate that an order has chosen in its final form.
 
         Returns None if it may not be used.
         """
@@ -452,11 +455,14 @@ class PlannedCuts(Protocol[T]):
 
 
 class _Candidates(Generic[T]):
-    """The candidates of each contour, and those among them that are not in their final form."""
+    """The candidates of each contour, and those among them that are in their final form."""
 
-    def __init__(self, tried: Sequence[list[T]], cuts: PlannedCuts[T], order: OrderOptions) -> None:
-        self.tried, self._cuts, self._order = tried, cuts, order
-        self._rough = list[T]()
+    def __init__(
+        self, tried: Sequence[list[T]], cuts: PlannedCuts[T], order: OrderKeywords
+    ) -> None:
+        self.tried, self._cuts, self._keywords = tried, cuts, order
+        self._order = OrderOptions(**order)
+        self._given, self._final = [len(each) for each in tried], list[T]()
 
     @property
     def plans(self) -> list[list[Plan]]:
@@ -481,14 +487,13 @@ class _Candidates(Generic[T]):
             with suppress(NoFeasiblePath):
                 one = self._cuts.in_posture(contour, posture, quick=quick)
             each += [] if one is None else [one]
-        self._rough += each[made:] if quick else []
         return self.plans[contour][made:]
 
     def turn_alike(self, contours: Iterable[int]) -> None:
         """Offer candidates of contours turned about the beam, alike in each posture.
 
         They are turned towards the first one in their posture, and that one towards home, or the
-        first one of all if there is no home. Turned candidates replace quickly planned ones.
+        first one of all if there is no home. Turned candidates replace those that were added.
         """
         near, first = dict[int, Array](), self._home
         for i in contours:
@@ -497,7 +502,7 @@ class _Candidates(Generic[T]):
                 first = self._mean(one) if first is None else first
                 aim = near.get(posture, first)
                 other = self._turned(one, aim, aim)
-                if other is not None and self._is_rough(one):
+                if other is not None and c >= self._given[i]:
                     self.tried[i][c] = other
                 elif other is not None:
                     self.tried[i].append(other)
@@ -521,20 +526,55 @@ class _Candidates(Generic[T]):
                 new |= other is not None
         return new
 
-    def settle(self, found: PartPlan) -> bool:
-        """Bring the chosen candidates into their final form; return whether they stay the same."""
-        chosen = [(i, self.tried[i][c]) for i, c in found.chosen]
-        new = [(i, one) for i, one in chosen if self._is_rough(one)]
-        same = True
-        for i, one in new:
-            settled, each = self._cuts.settled(one), self.tried[i]
-            self._rough = [other for other in self._rough if other is not one]
+    def settle(self, found: PartPlan) -> PartPlan | None:
+        """Bring the chosen candidates of an order into their final form; return their order.
+
+        Where that form differs they are ordered again, among themselves, with the bound of `found`.
+        None is returned where one may not be used, or their order takes longer by more than
+        `LONGER`: others may be better now.
+
+        Raises
+        ------
+        NoFeasiblePath
+            None of the candidates of a contour may be used.
+        """
+        same = usable = True
+        for i, c in found.chosen:
+            one = self.tried[i][c]
+            if any(one is other for other in self._final):
+                continue
+            settled = self._cuts.settled(one)
+            last = [] if settled is None else [settled]
+            self.tried[i][c : c + 1] = last
+            self._final += last
+            usable &= settled is not None
             same &= settled is not None and np.array_equal(
                 self._cuts.plan_of(settled).q, self._cuts.plan_of(one).q
             )
-            at = next(c for c, other in enumerate(each) if other is one)
-            each[at : at + 1] = [] if settled is None else [settled]
-        return same
+            if not self.tried[i]:
+                name = self._cuts.plan_of(one).name
+                said = f"contour {name!r}: none of its plans may be used"
+                raise NoFeasiblePath(said, proved=False, node=-1)
+        if same or not usable:
+            return found if same else None
+        return self._ordered_alone(found)
+
+    def _ordered_alone(self, found: PartPlan) -> PartPlan | None:
+        """Return the order of the chosen candidates of `found` among themselves, see `settle`."""
+        chosen = dict(found.chosen)
+        alone = [[made[chosen[i]]] for i, made in enumerate(self.plans)]
+        try:
+            last = order_plans(alone, **self._keywords)
+        except NoFeasiblePath:
+            return None
+        if last.order.duration > (1 + LONGER) * found.order.duration:
+            return None
+        bound = min(found.order.at_least, last.order.duration)
+        return replace(
+            last,
+            chosen=tuple((i, chosen[i]) for i, _ in last.chosen),
+            order=replace(last.order, at_least=bound),
+        )
 
     @property
     def _home(self) -> Array | None:
@@ -544,14 +584,9 @@ class _Candidates(Generic[T]):
     def _mean(self, one: T) -> Array:
         return np.asarray(self._cuts.plan_of(one).q.mean(axis=0))
 
-    def _is_rough(self, one: T) -> bool:
-        return any(one is other for other in self._rough)
-
     def _turned(self, one: T, before: Array, after: Array) -> T | None:
         made = turned(self._cuts.plan_of(one), before, after, self._order.cell)
-        other = None if made is None else self._cuts.with_plan(one, made)
-        self._rough += [] if other is None else [other]
-        return other
+        return None if made is None else self._cuts.with_plan(one, made)
 
 
 def order_candidates(
@@ -572,8 +607,8 @@ def order_candidates(
     tried : sequence of lists
         The planned candidates of each contour; candidates in other postures are appended.
     cuts : PlannedCuts
-        How further candidates are planned. Where the final form of a chosen one is not the same, an
-        order is sought again.
+        How further candidates are planned, and how the chosen ones are brought into their final
+        form. Where the order takes longer by more than `LONGER` then, one of all is sought again.
     postures : sequence of sequences of int, or None
         Postures that each contour may be cut in; None: all.
     common : sequence of sequences of int
@@ -593,7 +628,7 @@ def order_candidates(
     NoFeasiblePath, InputError
         As `order_plans`.
     """
-    offered = _Candidates(tried, cuts, OrderOptions(**order))
+    offered = _Candidates(tried, cuts, order)
     for i, wanted in enumerate(common):
         offered.add(i, wanted, progress, quick=True)
     may_turn = [i for i, wanted in enumerate(common) if wanted]
@@ -609,8 +644,9 @@ def order_candidates(
     found = ordered()
     if offered.turn_between(found, may_turn):
         found = ordered()
-    while not offered.settle(found):
+    while (settled := offered.settle(found)) is None:
         found = ordered()
+    found = settled
     # On the turns that the order has chosen.
     made = zip(found.chosen, found.plans, strict=True)
     last = (replace(offered.plans[i][c], q=on.q, turn=on.turn) for (i, c), on in made)

@@ -29,7 +29,14 @@ from kerfpath.planner import (
     plan_in_pieces,
 )
 from kerfpath.plans import Plan
-from kerfpath.progress import Progress, StopEarly, may_stop, shown_by, unstopped
+from kerfpath.progress import (
+    Progress,
+    StopEarly,
+    may_stop,
+    no_progress,
+    shown_by,
+    unstopped,
+)
 from kerfpath.refiner import refine
 
 _T = TypeVar("_T")
@@ -50,6 +57,23 @@ def cut_candidate(
     Plans are not certified yet, because one candidate is chosen first, and a cut without a plan
     has no advice yet, see `advised`. `graph_of` may return a graph that was kept; by default the
     joints that a plan folds are folded in it.
+    """
+    cuts = plan_candidate(prepared, request, candidate, progress, graph_of=graph_of)
+    return tuple(audited(prepared, cut, progress) for cut in cuts)
+
+
+def plan_candidate(
+    prepared: PreparedJob,
+    request: CutRequest,
+    candidate: Candidate,
+    progress: Progress,
+    *,
+    graph_of: GraphOf | None = None,
+) -> tuple[CutResult, ...]:
+    """Plan a candidate as `cut_candidate` does; a plan in one piece is not audited yet.
+
+    Its limits between the nodes are kept with the audit, which takes longer than the plan: that is
+    for the chosen candidates alone, see `audited`.
     """
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
@@ -117,7 +141,7 @@ def cut_candidate(
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
         return (replace(whole, broken=broken),)
-    return _all_audited(prepared, whole, plans, begin)
+    return _cuts_of(prepared, whole, plans, begin)
 
 
 def _whole(
@@ -164,7 +188,7 @@ def _cut_along_courses(
         return (replace(whole, broken=broken),)
     graph = job.graph(nodes, external=course_of_plans(job, nodes, plans), progress=solved)
     whole = _whole(job, request, candidate, graph, cell, begin)
-    return _all_audited(prepared, whole, plans, begin)
+    return _cuts_of(prepared, whole, plans, begin)
 
 
 def _at_nodes(job: Job) -> PlanOptions:
@@ -240,12 +264,17 @@ def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[s
     return dict.fromkeys(far, Remedy(other_method=False, move=move)) if move else {}
 
 
-def settled(prepared: PreparedJob, cut: CutResult) -> CutResult | None:
-    """Return a cut that was planned quickly or turned, with its audit; None where that fails."""
-    assert cut.plan is not None
-    whole = _without_plan(cut)
-    done = _audited(prepared, whole, cut.plan)
-    return done if done.passed else None
+def audited(prepared: PreparedJob, cut: CutResult, progress: Progress = no_progress) -> CutResult:
+    """Return a cut with its audit, the limits between its nodes kept if the job asks for that.
+
+    It is finished even if the searches are to end early. Without a plan, or with an audit, the cut
+    is returned as it is.
+    """
+    if cut.plan is None or cut.audited:
+        return cut
+    progress(f"{cut.request.task.name}: audit", 0, 0)
+    with unstopped():
+        return _audited(prepared, _without_plan(cut), cut.plan)
 
 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:
@@ -281,10 +310,12 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
     return cut
 
 
-def _all_audited(
+def _cuts_of(
     prepared: PreparedJob, whole: CutResult, plans: Sequence[Plan], begin: Callable[[str], None]
 ) -> tuple[CutResult, ...]:
-    """Return the cuts of the plans of a contour, even if the searches are to end early."""
+    """Return the cut of the plan of a contour, or of each of its pieces, which are audited."""
+    if len(plans) == 1:
+        return (replace(whole, plan=plans[0]),)
     begin("audit")
     with unstopped():
         return tuple(_audited(prepared, whole, made) for made in plans)

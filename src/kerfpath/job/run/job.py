@@ -16,10 +16,10 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run.contour import (
     advised,
-    cut_candidate,
+    audited,
     cut_in_posture,
     moved_into_reach,
-    settled,
+    plan_candidate,
     with_checks,
 )
 from kerfpath.job.run.foresee import require_foreseen
@@ -27,7 +27,7 @@ from kerfpath.job.run.remedy import Remedy
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import with_bound
 from kerfpath.plans import Plan
-from kerfpath.progress import Progress, StopEarly, may_stop, no_progress
+from kerfpath.progress import Progress, StopEarly, may_stop, no_progress, unstopped
 from kerfpath.sequence import PlannedCuts, common_postures, longest_search, order_candidates
 
 # -----------------------------------------------------------------------------
@@ -48,13 +48,14 @@ def order_cuts(
     ----------
     prepared : PreparedJob
     tried : sequence of sequences of tuples of CutResult
-        The result of each candidate of each contour: one cut, or its pieces. Contours at the end
-        may lack: they are not planned, and there is no order.
+        The result of each candidate of each contour: one cut, or its pieces. Plans that are not
+        audited yet are once they are chosen. Contours at the end may lack: they are not planned,
+        and there is no order.
     progress : callable
     """
     job = prepared.job
     result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
-    passed = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tried]
+    passed = [[cuts for cuts in each if all(cut.may_pass for cut in cuts)] for each in tried]
     missing = [
         each[0][0]
         for fine, each in zip(passed, tried, strict=True)
@@ -65,7 +66,7 @@ def order_cuts(
     )
     left = tuple(request.task.name for request in prepared.contours[len(tried) :])
     if job.sequence is None or left or not complete:
-        first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
+        first = (_first_that_passes(prepared, each, progress) for each in tried)
         every = tuple(cut for cuts in first for cut in cuts)
         return replace(result, cuts=every, not_planned=left)
     units, owner, before = _units(passed, prepared.inner_first)
@@ -85,12 +86,16 @@ def order_cuts(
     ]  # fmt: skip
 
     def in_given_order(stuck: NoFeasiblePath) -> JobResult:
-        return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
+        every = [[(one,) for one in unit] or tried[i] for unit, i in zip(units, owner, strict=True)]
+        first = (_first_that_passes(prepared, each, progress) for each in every)
+        cuts = tuple(cut for cuts in first for cut in cuts)
+        # A contour without a plan that passes is a failure of its own.
+        return replace(result, cuts=(*cuts, *missing), stuck=stuck if all(units) else None)
 
     try:
         part = order_candidates(
             units,
-            _JobCuts(prepared, units),
+            _JobCuts(prepared, units, progress),
             others,
             common_postures(served, others),
             progress=lambda unit, done, total: progress(
@@ -115,18 +120,21 @@ def order_cuts(
     chosen = [units[unit][candidate] for unit, candidate in part.chosen]
     cuts = [_as_ordered(prepared, *each) for each in zip(chosen, part.plans, strict=True)]
     o = job.options
-    audited = (
+    rows = (
         transfer_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
         for m in part.moves
     )
-    return replace(result, cuts=(*cuts, *missing), part=part, air=tuple(worst_of(audited)))
+    return replace(result, cuts=(*cuts, *missing), part=part, air=tuple(worst_of(rows)))
 
 
 class _JobCuts(PlannedCuts[CutResult]):
     """How the cuts of a job are planned for an order; numbers of contours are those of units."""
 
-    def __init__(self, prepared: PreparedJob, units: Sequence[Sequence[CutResult]]) -> None:
-        self._prepared, self._first = prepared, [unit[0] for unit in units]
+    def __init__(
+        self, prepared: PreparedJob, units: Sequence[Sequence[CutResult]], progress: Progress
+    ) -> None:
+        self._prepared, self._progress = prepared, progress
+        self._first = [unit[0] for unit in units]
 
     def plan_of(self, one: CutResult) -> Plan:
         return _plan(one)
@@ -139,7 +147,24 @@ class _JobCuts(PlannedCuts[CutResult]):
         return replace(one, plan=plan, checks=()) if is_whole else None
 
     def settled(self, one: CutResult) -> CutResult | None:
-        return settled(self._prepared, one)
+        done = audited(self._prepared, one, self._progress)
+        return done if done.passed else None
+
+
+def _first_that_passes(
+    prepared: PreparedJob, candidates: Sequence[tuple[CutResult, ...]], progress: Progress
+) -> tuple[CutResult, ...]:
+    """Return the cuts of the first candidate that pass their audit, else those of the first one.
+
+    They are audited even if the searches are to end early.
+    """
+    done = list[tuple[CutResult, ...]]()
+    with unstopped():
+        for cuts in candidates:
+            done.append(tuple(audited(prepared, cut, progress) for cut in cuts))
+            if all(cut.passed for cut in done[-1]):
+                return done[-1]
+    return done[0]
 
 
 def _units(
@@ -220,7 +245,7 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
             may_stop()
             if count > 1:
                 progress("contours", len(tried), count)
-            found = [cut_candidate(prepared, contour, c, progress) for c in contour.candidates]
+            found = [plan_candidate(prepared, contour, c, progress) for c in contour.candidates]
             tried.append(
                 [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )

@@ -43,7 +43,7 @@ class CutResult:
     advice : Remedy or None
         Speeds and shares of the limits that would make it feasible.
     checks : tuple of Check
-        The audit's table; empty without a plan.
+        The audit's table; empty without a plan, or before its audit.
     clearance : ClearanceMap or None
         The clearance of every pose in the cell, if the job asks for the map.
     departure : Departure or None
@@ -87,10 +87,20 @@ class CutResult:
         return self.broken is not None and not self.graph.has_poses_throughout
 
     @property
+    def audited(self) -> bool:
+        """Whether there is a plan with its audit."""
+        return self.plan is not None and bool(self.checks)
+
+    @property
     def passed(self) -> bool:
         """True when there is a plan and its audit finds no error."""
         rows = (*self.checks, *self.as_run.checks)
-        return self.plan is not None and not any(c.level == "error" and not c.ok for c in rows)
+        return self.audited and not any(c.level == "error" and not c.ok for c in rows)
+
+    @property
+    def may_pass(self) -> bool:
+        """True when there is a plan and no audit of it has found an error."""
+        return self.passed if self.audited else self.plan is not None
 
     def measured(self, part: Part, loop: Departure | None) -> CutResult:
         """Return the cut with the departure of its nodes.
