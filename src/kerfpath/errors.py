@@ -40,6 +40,8 @@ def printable(text: str, *, keep: str = "") -> str:
     keep : str
         Characters that stay, as ends of lines do where several lines are shown.
     """
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() or c in keep else repr(c)[1:-1] for c in text)
 
 

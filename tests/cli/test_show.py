@@ -104,6 +104,23 @@ def test_headings_are_folded_only_where_that_makes_room(monkeypatch):
     assert columns[3] in folded[-1]
 
 
+def test_a_table_of_very_many_rows_reads_as_one_of_few(monkeypatch):
+    def lines(count):
+        out = io.StringIO()
+        with redirect_stdout(out):
+            table(["loop", "length mm", "ends"], rows[:count], numbers=["length mm"])
+        return [line.rstrip() for line in out.getvalue().splitlines()]
+
+    names = ["hole \\[1]", "[bold]trim[/bold]", "\u5b54", "a:smile:b"]
+    rows = [[names[i % 4], f"{2.0**i:.1f}", "open"] for i in range(8)]
+    monkeypatch.setattr(show_module.out, "_width", 200)
+    few = lines(8)
+    monkeypatch.setattr(show_module, "_MANY", 8)
+    assert lines(8) == few
+    monkeypatch.setattr(show_module.out, "_width", 8)  # nothing is cut off
+    assert lines(8) == few
+
+
 def test_equal_notes_are_merged():
     notes = [f"warning: at {i} of 33 targets it is too large (hole {i})" for i in range(30)]
     told = merge_notes(["something else", *notes, "more 1"], [f"hole {i}" for i in range(30)])

@@ -186,6 +186,8 @@ class Loop:
     @property
     def edge_turns(self) -> tuple[EdgeTurn, ...]:
         """The sharp edges that it crosses, at which the beam turns by more than 2 deg."""
+        if self.surface == "plane":
+            return ()
         return edge_turns(self._trace.sample(COARSE_CHORD, COARSE_ANGLE), MM)
 
     def line(self, chord_tolerance: float = 1e-4) -> Array:

@@ -140,7 +140,9 @@ def list_contours(part: Part, html: Path | None, *, everything: bool) -> None:
     if html is not None:
         with busy(f"drawing {html.name}"):
             write_program(html, _page(part, main))
-    print_json(_contours_entry(part, html))
+    if out.quiet:
+        print_json(_contours_entry(part, html))
+        return
     show_drawing(part)
     shown = part.loops if everything else main
     optional = [

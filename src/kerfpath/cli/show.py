@@ -15,7 +15,7 @@ from threading import Event, Thread
 from time import monotonic
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderableType
+from rich.console import Console, ConsoleOptions, JustifyMethod, RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
@@ -35,6 +35,10 @@ _LEAST_OF_WORDS = 16
 """Least width of a column of words in characters, unless its words are shorter."""
 _ROOM_FOR_WORDS = 40
 """Width in characters that is enough for words; headings are not folded to gain more."""
+_MANY = 1000
+"""Rows from which on nothing is folded: rich takes about half a millisecond for each cell."""
+_MARKUP = re.compile(r"[\[\\:]")
+"""A character of markup, or of the name of a symbol."""
 _BETWEEN = 2
 """Characters between two columns of a table."""
 LINE_SECONDS = 10.0
@@ -85,13 +89,13 @@ def table(
 
     Columns in `numbers` are aligned right; these and those in `whole` are never folded. In a narrow
     terminal headings longer than their column are folded first, then columns in `spare` are left
-    out, in that order, until the others fit, and last of all words are folded.
+    out, in that order, until the others fit, and last of all words are folded; in tables of
+    `_MANY` rows they are not.
     """
     rows = [[printable(cell) for cell in row] for row in rows]  # as wide as they are printed
     fixed = {*numbers, *whole}
     cells = [
-        max((cell_len(Text.from_markup(row[i]).plain) for row in rows), default=0)
-        for i in range(len(columns))
+        max((cell_len(_plain(row[i])) for row in rows), default=0) for i in range(len(columns))
     ]
     kept, heads, left_out = list(range(len(columns))), list(columns), list[str]()
 
@@ -113,20 +117,43 @@ def table(
             break
         kept.remove(columns.index(name))
         left_out.append(name)
-    shown = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
-    for i in kept:
-        right = columns[i] in numbers
-        shown.add_column(
-            heads[i],
-            justify="right" if right else "left",
-            no_wrap=columns[i] in fixed,
-            overflow="fold",
-        )
-    for row in rows:
-        shown.add_row(*(row[i] for i in kept))
-    out.print(shown, soft_wrap=False)
+    heads, right = [heads[i] for i in kept], [columns[i] in numbers for i in kept]
+    rows = [[row[i] for i in kept] for row in rows]
+    if len(rows) >= _MANY:
+        _print_lines(title, heads, rows, right)
+    else:
+        shown = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
+        for i, head, is_right in zip(kept, heads, right, strict=True):
+            justify: JustifyMethod = "right" if is_right else "left"
+            no_wrap = columns[i] in fixed
+            shown.add_column(head, justify=justify, no_wrap=no_wrap, overflow="fold")
+        for row in rows:
+            shown.add_row(*row)
+        out.print(shown, soft_wrap=False)
     if left_out:
         out.print(f"no room for: {', '.join(left_out)}; a wider terminal or --json shows them")
+
+
+def _print_lines(
+    title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[bool]
+) -> None:
+    """Print a table without folding; columns that are `right` are aligned so."""
+    every = [[head.replace("\n", " ") for head in heads], *([_plain(c) for c in r] for r in rows)]
+    widths = [max(map(cell_len, column)) for column in zip(*every, strict=True)]
+    lines = [title] if title else []
+    for row in every:
+        blank = [" " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]
+        padded = (
+            space + cell if at_right else cell + space
+            for cell, space, at_right in zip(row, blank, right, strict=True)
+        )  # fmt: skip
+        lines.append((" " * _BETWEEN).join(padded).rstrip())
+    out.print(Text("\n".join(lines)))
+
+
+def _plain(cell: str) -> str:
+    """Return the text of a cell without its markup."""
+    return Text.from_markup(cell).plain if _MARKUP.search(cell) else cell
 
 
 def merge_notes(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
