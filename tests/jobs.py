@@ -170,7 +170,9 @@ def speeds_on_grid(job):
     cell, found = cell_of_job(job, part), []
     for task in job.tasks(part):
         try:
-            found.append(fastest_along(job, task.evenly_fast(part), cell, refine=False))
+            found.append(
+                fastest_along(job, task.sample(task.candidates(part)[0]), cell, refine=False)
+            )
         except NoFeasiblePath as broken:
             found.append(broken)
     return found

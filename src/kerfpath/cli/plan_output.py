@@ -107,7 +107,8 @@ def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
     at = "at x y z mm"
     table([*columns, at], rows, numbers=columns[1:8], spare=[at])
     out.print(
-        "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
+        "speeds for speed_m_min, cuts are slower where the job has shares of it or crosses sharp "
+        "edges; on the grid: the fastest constant speed there, exact; refined: the fastest speed "
         "found off the grid, not proved to be the fastest possible; both keep the limits at "
         "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
         "if the job asks for it (between_nodes) and one was found; true to path: a speed at which "

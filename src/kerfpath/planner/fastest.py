@@ -94,7 +94,9 @@ def fastest_speed(
     """Return the largest constant speed at which a path exists: exact on the graph, or off it.
 
     On the layered graph this is a second-order minimax problem. The speed is that of `plan`, which
-    counts for the longest step between two nodes, and `plan` finds a motion at it, too.
+    counts for the longest step between two nodes, and `plan` finds a motion at it, too. A contour
+    with its own times, as of `Contour.resample` with `dt`, is slower where it has a share of the
+    speed; all its times change by the same factor.
 
     Parameters
     ----------
@@ -125,7 +127,11 @@ def fastest_speed(
         range, or costs of comfort.
     """
     require_rates_alone(robot, "the fastest speed")
-    require_even(contour, np.diff(contour.s), "m")
+    if contour.time is None:
+        require_even(contour, np.diff(contour.s), "m")
+    else:  # all times changed so that the longest step is made at 1 m/s
+        slower = longest_step(contour) / node_interval(contour, None)
+        contour = replace(contour, time=contour.time * slower)
     asked = with_keywords(options, keywords, SpeedKeywords)
     if enough is not None:
         enough = scalar(enough, "enough", unit="m/s", above=0.0)
@@ -133,10 +139,10 @@ def fastest_speed(
     if comfort is not None and comfort.costs:
         raise InputError("comfort: the fastest speed takes no costs; give margins only")
     task = planning_task(
-        contour if contour.time is None else replace(contour, time=None),
+        contour,
         Setup.of(robot, tool, placement, cell),
         PlanOptions(**{name: getattr(asked, name) for name in SpeedKeywords.__annotations__}),
-        speed=1.0,
+        speed=1.0 if contour.time is None else None,
         graph=graph,
         external=external,
         progress=progress,

@@ -98,7 +98,7 @@ def fastest_message(
     """
     job = prepared.job
     request = next(each for each in prepared.contours if each.task.name == contour)
-    nodes = request.task.evenly_fast(prepared.part)
+    nodes = request.candidates[0].nodes
     leaves = job.options.refine or job.options.method == "continuous"
     try:
         own = replace(job, options=request.options)

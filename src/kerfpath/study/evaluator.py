@@ -66,8 +66,8 @@ class SampledContour:
         return replace(self, nodes=replace(run, s=np.arange(len(run), dtype=float) * step))
 
 
-def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[SampledContour, ...]:
-    """Return the sampled contours of a job, each at one speed, or with `as_asked` at its speeds.
+def sample_contours(job: Job, part: Part) -> tuple[SampledContour, ...]:
+    """Return the contours of a job, sampled as they are planned.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[Sa
     return tuple(
         SampledContour(
             name=task.name,
-            nodes=task.sample(task.candidates(part)[0]) if as_asked else task.evenly_fast(part),
+            nodes=task.sample(task.candidates(part)[0]),
             speed=task.speed,
         )
         for task in job.tasks(part)

@@ -2,7 +2,10 @@
 
 import re
 
+import numpy as np
 import pytest
+from tests.cad.test_bent_parts import square_tube
+from tests.cad.test_part import cylinder, write_step
 
 from jobs import DEMO, SMALL
 from kerfpath.job import fastest_speeds, read_job, run_job
@@ -49,3 +52,42 @@ def test_where_nothing_is_kept_there_is_no_such_speed(tmp_path, without):
     text = text.replace('between_nodes = "guaranteed"', 'between_nodes = "kept"')
     assert text != GUARANTEED
     assert [each.as_run for each in fastest_speeds(read(tmp_path, text))] == [None, None]
+
+
+TUBE_JOB = """\
+[robot]
+model = "abb_irb4600_60_205"
+acceleration_ratio = "iontec_20_to_70kg"
+[tool]
+head = "laser-head-90"
+[part]
+file = "part.step"
+xyz_mm = [1200, 0, 600]
+rpy_deg = [0, 0, 0]
+[[contour]]
+pick = "skin1/hole1"
+speed_m_min = 3
+spacing_mm = 2
+[plan]
+certify = false
+gamma_step_deg = 10
+[program]
+language = "none"
+"""
+
+
+@pytest.mark.slow
+def test_the_speed_holds_for_the_nodes_of_a_cut_that_is_slower_at_sharp_edges(tmp_path):
+    """At one speed everywhere a turn of 90 deg would lie between two nodes: half the speed."""
+    write_step(tmp_path / "part.step", square_tube(cylinder(6, 10, (100, 0, 35))))
+    (tmp_path / "job.toml").write_text(TUBE_JOB)
+    (found,) = fastest_speeds(read_job(tmp_path / "job.toml"))
+    speed = found.at_nodes.speed
+    assert speed < found.at_nodes.ceiling
+    slower = TUBE_JOB.replace("speed_m_min = 3", f"speed_m_min = {0.9999 * speed * 60!r}")
+    (tmp_path / "job.toml").write_text(slower)
+    (cut,) = (result := run_job(read_job(tmp_path / "job.toml"))).cuts
+    assert result.passed
+    assert cut.plan.contour.s == pytest.approx(found.nodes.s, abs=1e-12)
+    # The edges take most of the time, in which the tip moves by a tenth of a step.
+    assert np.diff(cut.plan.contour.s).min() < 0.15 * np.diff(cut.plan.contour.s).max()

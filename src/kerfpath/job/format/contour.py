@@ -257,11 +257,6 @@ class ContourSpec:
         table = self.table.model_copy(update={"corners": sharp})
         return replace(self, table=table).candidates(part, drawn)
 
-    def evenly_fast(self, part: Part) -> Contour:
-        """Return the first candidate, sampled, at the full speed everywhere."""
-        path = self.candidates(part)[0]
-        return self.sample(replace(path, speed_share=np.ones(len(path))))
-
     def sample(self, contour: Contour) -> Contour:
         """Return the contour, sampled and named as this spec says.
 

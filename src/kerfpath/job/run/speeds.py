@@ -13,7 +13,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.execution import Executed, Kept, share_within
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import allowed_off, keeps_between_nodes, kept_between_nodes, run_of
-from kerfpath.job.format import ContourSpec, Job, cell_of_job
+from kerfpath.job.format import ContourSpec, Job, prepare
 from kerfpath.planner import FastestSpeed, fastest_speed, plan
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
@@ -35,7 +35,7 @@ def speed_as_run(
 
     It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by planning, and
     proved for that speed and the plan that is returned; a faster one may exist. None if the job
-    does not ask for it, or if none is found.
+    does not ask for it, or if none is found. Times of the nodes are those at 1 m/s.
     """
     if not keeps_between_nodes(job):
         return None
@@ -101,10 +101,12 @@ def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | N
 
 
 def _planned(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Plan | None:
-    """Return a plan at a speed, m/s; None if there is none."""
+    """Return a plan at a speed, m/s; None if there is none. Times of nodes are those at 1 m/s."""
+    timed = nodes.time is not None
     try:
         return plan(
-            nodes, job.robot, tool=job.tool, placement=job.placement, speed=speed,
+            nodes if nodes.time is None else replace(nodes, time=nodes.time / speed),
+            job.robot, tool=job.tool, placement=job.placement, speed=None if timed else speed,
             options=replace(job.options, certify=None, between_nodes="reported"), cell=cell,
         )  # fmt: skip
     except NoFeasiblePath:
@@ -181,21 +183,24 @@ def leaves_grid(job: Job) -> bool:
 def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[ContourSpeed]:
     """Return the fastest constant speed of each contour of a job, at its nodes and as run.
 
-    The speeds in the job, shares of them, and the penalties of [comfort] have no effect.
+    They are speeds to be asked for in place of those of the job: a cut stays slower where its job
+    has shares of its speed, or its axis turns about sharp edges. The penalties of [comfort] have no
+    effect. Each contour is cut as its first candidate.
 
     Raises
     ------
     InputError
         As `run_job`.
     """
-    part = job.read_part()
-    cell = cell_of_job(job, part)
-    answers = []
-    tasks = job.tasks(part)
-    for i, task in enumerate(tasks):
-        progress("contours", i, len(tasks))
+    prepared, answers = prepare(job), list[ContourSpeed]()
+    cell = prepared.cell
+    for i, request in enumerate(prepared.contours):
+        task, first = request.task, request.candidates[0]
+        progress("contours", i, len(prepared.contours))
         progress(f"{task.name}: fastest speed", 0, 0)
-        nodes, own = task.evenly_fast(part), replace(job, options=task.asked(job.options))
+        nodes, own = first.nodes, replace(job, options=request.options)
+        if nodes.time is not None:
+            nodes = replace(nodes, time=nodes.time * task.speed)  # at 1 m/s
         try:
             found = fastest_along(own, nodes, cell, refine=leaves_grid(job), ceiling=True)
         except NoFeasiblePath as broken:
@@ -214,7 +219,7 @@ def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[Contou
                 nodes=nodes,
                 at_nodes=found,
                 as_run=None if kept is None else speed,
-                true_to_path=speed_true_to_path(free, run, task.candidates(part)[0], speed),
+                true_to_path=speed_true_to_path(free, run, first.path, speed),
             )
         )
     return answers

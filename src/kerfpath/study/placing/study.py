@@ -153,7 +153,7 @@ def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValu
 def contours_of(job: str, digest: str, goal: str) -> tuple[SampledContour, ...]:
     """Return the sampled contours of a job: each at one speed, or for "motion" at its speeds."""
     known = load_job(job, digest)
-    return sample_contours(known.job, known.part, as_asked=goal == "motion")
+    return sample_contours(known.job, known.part)
 
 
 def nodes_of(contours: Sequence[SampledContour]) -> list[Contour]:
