@@ -100,7 +100,7 @@ def test_an_order_is_shortened_within_its_rules(seed: int) -> None:
         first = np.concatenate([holes, outlines]) * each
         if np.isfinite(length(first)):
             break
-    found = shortened(first, group, time, earlier)
+    found = shortened(first, group, time, earlier, np.zeros(len(group)), 0.0 * earlier)
     assert sorted(group[found].tolist()) == list(range(2 * plates))
     at = np.argsort(group[found])
     assert (at[::2] < at[1::2]).all()

@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import replace
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 from time import monotonic
 
 import numpy as np
@@ -29,10 +29,10 @@ from programs import read_text, text_of
 STEP = np.radians(10)
 
 
-def every_order(group, own, between, first, last, before):
+def every_order(group, own, between, first, last, before, rest=None):
     """The least time over all orders and candidates, one by one."""
     G = group.max() + 1
-    best = np.inf
+    best, rest = np.inf, np.zeros((G, G)) if rest is None else rest
     for groups in permutations(range(G)):
         place = {g: k for k, g in enumerate(groups)}
         if any(place[g] >= place[h] for g, h in before):
@@ -40,7 +40,12 @@ def every_order(group, own, between, first, last, before):
         for chosen in product(*(np.flatnonzero(group == g) for g in groups)):
             c = np.array(chosen)
             time = first[c[0]] + own[c].sum() + between[c[:-1], c[1:]].sum() + last[c[-1]]
-            best = min(best, time)
+            if time < best and all(
+                own[c[i + 1 : j]].sum() + between[c[i:j], c[i + 1 : j + 1]].sum()
+                >= rest[groups[i], groups[j]]
+                for i, j in combinations(range(G), 2)
+            ):
+                best = time
     return best
 
 
@@ -67,6 +72,46 @@ def test_the_order_is_the_best_of_all(seed):
     assert sorted(group[found.candidates]) == list(range(G))
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_the_order_with_rests_is_the_best_of_all(seed):
+    rng = np.random.default_rng(seed)
+    G = int(rng.integers(3, 6))
+    group = np.concatenate([np.arange(G), rng.integers(0, G, rng.integers(0, 4))])
+    C = len(group)
+    own, first, last = rng.random((3, C))
+    between = rng.random((C, C))
+    before = [(0, 1)] if seed % 3 == 0 else []
+    rest = np.triu(np.where(rng.random((G, G)) < 0.4, rng.uniform(0.5, 2.5, (G, G)), 0.0), 1)
+    asked = {"first": first, "last": last, "before": before, "rest": rest + rest.T}
+    best = every_order(group, own, between, first, last, before, rest + rest.T)
+    if np.isinf(best):
+        with pytest.raises(NoFeasiblePath, match="time between near ones") as none:
+            best_order(group, own, between, **asked)
+        assert none.value.proved
+        return
+    found = best_order(group, own, between, **asked)
+    # The solver counts in ticks of 0.1 ms, one rounding for each candidate and move, and a rest may
+    # be short by as much; of random times none decides by so little.
+    assert found.duration == pytest.approx(best, abs=1e-4 * (2 * G + 2))
+    assert found.optimal
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_groups_get_their_rest_even_in_no_time(seed):
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(0, 1, (40, 2))
+    apart = np.linalg.norm(place[:, None] - place, axis=2)
+    rest = np.where((apart < 0.15) & (apart > 0), 2.0, 0.0)
+    own = np.full(40, 0.5)
+    for seconds in (1e-6, 3.0):
+        found = best_order(np.arange(40), own, apart, rest=rest, seconds=seconds)
+        c = found.candidates
+        end = np.cumsum(own[c] + np.append(0.0, apart[c[:-1], c[1:]]))
+        gap = (end - own[c])[None] - end[:, None]
+        assert np.triu(rest[np.ix_(c, c)] - gap, 1).max() < 1e-2  # 82 roundings of 0.1 ms
+        assert found.at_least <= found.duration
+
+
 def test_orders_that_contradict_are_refused_and_shapes_too():
     with pytest.raises(NoFeasiblePath, match="contradict"):
         best_order([0, 1], [0, 0], np.zeros((2, 2)), before=[(0, 1), (1, 0)])
@@ -74,6 +119,9 @@ def test_orders_that_contradict_are_refused_and_shapes_too():
         best_order([0, 2], [0, 0], np.zeros((2, 2)))
     with pytest.raises(InputError, match="times >= 0"):
         best_order([0, 1], [0, 0], np.full((2, 2), -1.0))
+    for wrong in ([[0, 1], [2, 0]], [[1, 0], [0, 0]], [[0, -1], [-1, 0]]):
+        with pytest.raises(InputError, match="rest: expected times"):
+            best_order([0, 1], [0, 0], np.zeros((2, 2)), rest=wrong)
 
 
 def test_least_time_is_that_of_a_trapezoid():
@@ -250,6 +298,14 @@ def test_home_heat_and_precedence_are_kept(part, arm, tool, placement):
         plan_part([rest(c) for c in part], arm, heat_spacing=0.15, **asked)
     three = plan_part([rest(c) for c in (part[0], part[3])], arm, heat_spacing=0.15, **asked)
     assert len(three.plans) == 2
+    # After a second they may: the others take longer.
+    cooled = plan_part([rest(c) for c in part], arm, heat_spacing=0.15, heat_time=1.0, **asked)
+    done = [int(p.name.removeprefix("hole ")) for p in cooled.plans]
+    for i, j in combinations(range(4), 2):
+        if {done[i], done[j]} not in ({0, 3}, {1, 2}):  # across the square
+            assert cooled.rests[i, j] >= 1.0 - 1e-2
+    with pytest.raises(NoFeasiblePath, match="time between near ones"):
+        plan_part([rest(c) for c in part], arm, heat_spacing=0.15, heat_time=1e3, **asked)
 
 
 @pytest.fixture(scope="module")

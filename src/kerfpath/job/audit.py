@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath import __version__
-from kerfpath.arrays import Array, short_repr
+from kerfpath.arrays import Array, Bools, short_repr
 from kerfpath.auditor import (
     BOUND,
     MOST_ROUNDED,
@@ -96,9 +96,12 @@ from kerfpath.transfer import End, TransferMove, back_off
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.
 
+SAME_REST = 0.01
+"""s: the solver of the order counts times in 0.1 ms, one rounding for each candidate and move."""
+
 
 def check_sequence(
-    expected: Expected, done: Sequence[int], paths: Sequence[Contour]
+    expected: Expected, done: Sequence[int], paths: Sequence[Contour], rests: Array | None
 ) -> list[Check]:
     """Return the checks of an order of cutting; their node is the number of the cut.
 
@@ -110,6 +113,8 @@ def check_sequence(
         contour follow each other with the same number.
     paths : sequence of Contour
         The nodes of each cut.
+    rests : (G, G) s or None
+        Time from the end of each cut to the beginning of every later one; None if not known.
     """
     sequence = expected.job.sequence
     rows = check_order(sequence, expected.inner_first, done)
@@ -117,8 +122,16 @@ def check_sequence(
         count_at("pieces", "pieces cut after a later piece of their contour", _early(done, paths))
     )
     if sequence is not None and sequence.heat_spacing_mm > 0:
-        warm = _too_warm(expected, done, paths, sequence.heat_spacing_mm / 1000)
-        rows.append(count_at("heat-spacing", "contours cut right after one that is too near", warm))
+        near = _near(expected, done, paths, sequence.heat_spacing_mm / 1000)
+        if sequence.heat_time_s == 0:
+            warm, what = np.flatnonzero(np.diagonal(near, 1)), "right"
+        elif rests is None:
+            return [*rows, count("heat-spacing", "times between near contours not known", 1)]
+        else:
+            soon = np.argwhere(np.triu(near & (rests < sequence.heat_time_s - SAME_REST), 1))
+            warm, what = np.unique(soon[:, 1]) - 1, f"within {sequence.heat_time_s:g} s"
+        title = f"contours cut {what} after one that is too near"
+        rows.append(count_at("heat-spacing", title, (warm + 1).tolist()))
     return rows
 
 
@@ -131,19 +144,28 @@ def _early(done: Sequence[int], paths: Sequence[Contour]) -> list[int]:
     ]
 
 
-def _too_warm(
+def _near(
     expected: Expected, done: Sequence[int], paths: Sequence[Contour], spacing: float
-) -> list[int]:
-    """Return the cuts that follow one nearer than `spacing` (m), by the first candidate of each."""
+) -> Bools:
+    """Return which cuts (G, G) are nearer than `spacing` (m), by the first candidate of each."""
     whole = {i for i in done if list(done).count(i) == 1}
     first = {i: expected.contours[i].candidates[0].nodes for i in whole}
     shapes = [first.get(i, path) for i, path in zip(done, paths, strict=True)]
-    found = []
-    for k, (one, two) in enumerate(pairwise(shapes)):
-        apart, _ = cKDTree(one.points).query(two.points)
-        if np.asarray(apart).min() < spacing:
-            found.append(k + 1)
-    return found
+    near = np.zeros((len(shapes), len(shapes)), np.bool_)
+    for i, j in combinations(range(len(shapes)), 2):
+        apart, _ = cKDTree(shapes[i].points).query(shapes[j].points)
+        near[i, j] = near[j, i] = np.asarray(apart).min() < spacing
+    return near
+
+
+def _rests(
+    expected: Expected, plans: Sequence[Plan], moves: Sequence[TransferMove]
+) -> Array | None:
+    """Return the times (G, G) s between cuts by their moves; None if moves are missing."""
+    homes = 2 if expected.job.home is not None else 0
+    part = expect_sequence(expected, plans, moves, 0.0) if plans else None
+    is_whole = len(moves) == len(plans) - 1 + homes
+    return replace(part, moves=tuple(moves)).rests if part is not None and is_whole else None
 
 
 # -----------------------------------------------------------------------------
@@ -615,9 +637,10 @@ class Audit:
             table += compare(entry, entries[each.name], of=JOB)
         rows += compare_jobs(job, file.job)
         paths = [p.contour for p in file.plans]
-        rows += check_sequence(expected, [each.number for each in planned], paths)
-        rows += self._whole(file, judged, planned)
         plans = [each.plan for each in planned if each.plan is not None]
+        rests = _rests(expected, plans, file.moves) if len(plans) == len(planned) else None
+        rows += check_sequence(expected, [each.number for each in planned], paths, rests)
+        rows += self._whole(file, judged, planned)
         if len(plans) == len(planned) and plans:
             tables.setdefault(AIR, []).extend(check_moves(expected, plans, file.moves))
         note = collision_note(cell, moves_too=job.sequence is not None)

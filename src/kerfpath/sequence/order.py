@@ -7,9 +7,10 @@ OR-tools) proves that its order is best, or gives a bound.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle, pairwise, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -310,9 +311,12 @@ def best_order(
     first: ArrayLike | None = None,
     last: ArrayLike | None = None,
     before: Sequence[tuple[int, int]] = (),
+    rest: ArrayLike | None = None,
     seconds: float = 10.0,
 ) -> Order:
     """Return the order of least time that visits one candidate of every group.
+
+    It never waits: where groups need a rest between them, others come in between.
 
     Parameters
     ----------
@@ -328,6 +332,8 @@ def best_order(
         where that is not allowed. Default: 0.
     before : sequence of (g, h)
         Group g comes before group h.
+    rest : (G, G) s, optional
+        Least time from the end of either of two groups to the beginning of the other one; 0: none.
     seconds : float s
         Time limit of the solver.
 
@@ -336,7 +342,8 @@ def best_order(
     NoFeasiblePath
         No order satisfies all of this (proved), or none was found in time.
     InputError
-        The shapes do not fit, a group has no candidates, or `before` has an unknown group.
+        The shapes do not fit, a group has no candidates, `before` has an unknown group, or `rest`
+        is not symmetric.
     """
     g = integers(group, "group", (None,))
     C, G = len(g), int(g.max(initial=-1)) + 1
@@ -355,12 +362,15 @@ def best_order(
             raise InputError(f"{name}: expected {C} times >= 0, got {time.tolist()}")
         ends.append(time)
     enter, leave = ends
-    return _solve(g, cost, move, enter, leave, before, seconds)
+    pause = floats(np.zeros((G, G)) if rest is None else rest, "rest", (G, G))
+    if (pause < 0).any() or (pause != pause.T).any() or pause.diagonal().any():
+        raise InputError("rest: expected times >= 0, the same either way and 0 on the diagonal")
+    return _solve(g, cost, move, enter, leave, before, pause, seconds)
 
 
 def _solve(
     group: Ints, own: Array, move: Array, enter: Array, leave: Array,
-    before: Sequence[tuple[int, int]], seconds: float,
+    before: Sequence[tuple[int, int]], rest: Array, seconds: float,
 ) -> Order:  # fmt: skip
     require_extra("programs", "the order of cuts")
     from ortools.sat.python import cp_model  # loaded where it is needed: half a second
@@ -370,8 +380,8 @@ def _solve(
     for g, h in before:
         earlier[g, h] = True
     time = _times(group, own, move, enter, leave, earlier)
-    start = _nearest_first(group, time, earlier)
-    start = None if start is None else shortened(start, group, time, earlier)
+    start = _nearest_first(group, own, time, earlier, rest)
+    start = None if start is None else shortened(start, group, time, earlier, own, rest)
     among = _short_legs(time, start)
     is_whole = bool((among == np.isfinite(time)).all())
     model = cp_model.CpModel()
@@ -396,6 +406,8 @@ def _solve(
             model.add(there == here + 1).only_enforce_if(way)
         for g, h in waiting:
             model.add(place[g] < place[h])
+    if rest.any():
+        _let_rest(model, group, own, time, rest, taken, without)
     model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
     if start is not None:
         steps = {0: 0} | {int(i) + 1: k for k, i in enumerate(start.tolist())}
@@ -427,8 +439,8 @@ def _solve(
     else:
         proved = is_whole and status == cp_model.INFEASIBLE
         why = (
-            "its constraints (which contour may follow or must come before another) contradict "
-            "each other"
+            "its constraints (which contour may follow or must come before another"
+            f"{', and the time between near ones' if rest.any() else ''}) contradict each other"
             if proved
             else f"none that keeps the constraints was found within {seconds:g} s; give more with "
             "seconds in [sequence]"
@@ -438,6 +450,39 @@ def _solve(
     if is_whole and status in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         least = max(least, solver.best_objective_bound * TICK)
     return Order(candidates=order, duration=duration, at_least=min(least, duration))
+
+
+def _let_rest(
+    model: Any, group: Ints, own: Array, time: Array, rest: Array,
+    taken: Mapping[tuple[int, int], Any], without: Sequence[Any],
+) -> None:  # fmt: skip
+    """Add to a model of an order that groups have their rest, but for the rounding of times."""
+    G, ticks = len(rest), np.rint(np.where(np.isfinite(time), time, 0.0) / TICK).astype(int)
+    longest = np.zeros(G, int)
+    np.maximum.at(longest, group, ticks[:, 1:].max(axis=0))
+    end = [model.new_int_var(0, int(longest.sum()), f"end of {h}") for h in range(G)]
+    for (a, b), way in taken.items():
+        if b:
+            begun = end[group[a - 1]] if a else 0
+            model.add(end[group[b - 1]] == begun + int(ticks[a, b])).only_enforce_if(way)
+    begin = list(end)
+    for i, (h, its_own) in enumerate(zip(group.tolist(), own.tolist(), strict=True)):
+        begin[h] = begin[h] - round(its_own / TICK) * (1 - without[i])
+    for g, h in np.argwhere(np.triu(rest)).tolist():
+        least = int(rest[g, h] / TICK) - G
+        first = model.new_bool_var(f"{g} before {h}")
+        model.add(begin[h] >= end[g] + least).only_enforce_if(first)
+        model.add(begin[g] >= end[h] + least).only_enforce_if(~first)
+
+
+def keeps_rest(order: Ints, group: Ints, own: Array, time: Array, rest: Array) -> bool:
+    """Return whether an order of candidates has every rest, but for the rounding of times."""
+    if not rest.any():
+        return True
+    end = np.cumsum(time[np.append(0, order[:-1] + 1), order + 1])
+    between = (end - own[order])[None] - end[:, None]
+    enough = between >= rest[np.ix_(group[order], group[order])] - 2 * TICK * (len(order) + 1)
+    return bool(enough[np.triu_indices(len(order), 1)].all())
 
 
 def _duration(order: Ints, time: Array) -> float:
@@ -483,7 +528,9 @@ STARTS = 32
 """Number of candidates from which orders are begun that go to the nearest one each."""
 
 
-def _nearest_first(group: Ints, time: Array, earlier: Bools) -> Ints | None:
+def _nearest_first(
+    group: Ints, own: Array, time: Array, earlier: Bools, rest: Array
+) -> Ints | None:
     """Return the best of some orders that go to the nearest allowed candidate, None if all end.
 
     The solver starts from it, so an order is there however little time it has.
@@ -492,15 +539,19 @@ def _nearest_first(group: Ints, time: Array, earlier: Bools) -> Ints | None:
     firsts = np.argsort(time[0, 1:], kind="stable")
     for first in firsts[np.isfinite(time[0, 1:][firsts])][:STARTS].tolist():
         order, left, missing = list[int](), np.ones(len(group), bool), earlier.sum(axis=0)
-        here, following = 0, first
+        here, following, now = 0, first, 0.0
+        rested: Array = np.zeros(len(rest))
         while np.isfinite(time[here, following + 1]):
             order.append(following)
+            now += time[here, following + 1]
+            rested = np.maximum(rested, now + rest[group[following]])
             left &= group != group[following]
             missing = missing - earlier[group[following]]
             here = following + 1
             if not left.any():
                 break
-            reach = np.where(left & (missing[group] == 0), time[here, 1:], np.inf)
+            may = left & (missing[group] == 0) & (now + time[here, 1:] - own >= rested[group])
+            reach = np.where(may, time[here, 1:], np.inf)
             following = int(np.argmin(reach))
             if not np.isfinite(reach[following]):
                 break
@@ -515,7 +566,9 @@ BLOCKS = (1, 2, 3, 4, 6, 8)
 """Numbers of successive groups that are moved together to another place in an order."""
 
 
-def shortened(order: Ints, group: Ints, time: Array, earlier: Bools) -> Ints:
+def shortened(
+    order: Ints, group: Ints, time: Array, earlier: Bools, own: Array, rest: Array
+) -> Ints:
     """Return an order in which no group, nor a few in succession, is better elsewhere in it.
 
     A group that is moved alone may also change its candidate. It takes a second for 400 groups.
@@ -527,24 +580,25 @@ def shortened(order: Ints, group: Ints, time: Array, earlier: Bools) -> Ints:
         in_vain += 1
         if at + size > len(order):
             continue
-        block, rest = order[at : at + size], np.delete(order, np.s_[at : at + size])
-        own, others = group[block], group[rest]
-        heads, tails = (members[own[0]],) * 2 if size == 1 else (block[:1], block[-1:])
-        around = np.concatenate([[0], rest + 1, [0]])
+        block, left = order[at : at + size], np.delete(order, np.s_[at : at + size])
+        its, others = group[block], group[left]
+        heads, tails = (members[its[0]],) * 2 if size == 1 else (block[:1], block[-1:])
+        around = np.concatenate([[0], left + 1, [0]])
         leg = time[around[:-1], around[1:]]
         shut = ~np.isfinite(leg)  # only the block in between makes this an order
         longer = time[np.ix_(around[:-1], heads + 1)] + time[np.ix_(tails + 1, around[1:])].T
         longer -= np.where(shut, 0.0, leg)[:, None]
         if shut.any():
             longer[~shut] = np.inf
-        after = np.flatnonzero(earlier[np.ix_(others, own)].any(axis=1))
-        until = np.flatnonzero(earlier[np.ix_(own, others)].any(axis=0))
+        after = np.flatnonzero(earlier[np.ix_(others, its)].any(axis=1))
+        until = np.flatnonzero(earlier[np.ix_(its, others)].any(axis=0))
         longer[: after[-1] + 1 if after.size else 0] = np.inf
         longer[until[0] + 1 if until.size else len(longer) :] = np.inf
         place, which = np.unravel_index(np.argmin(longer), longer.shape)
-        moved = members[own[0]][which : which + 1] if size == 1 else block
-        other = np.insert(rest, place, moved)
-        if _duration(other, time) < _duration(order, time) - TICK:
+        moved = members[its[0]][which : which + 1] if size == 1 else block
+        other = np.insert(left, place, moved)
+        is_better = _duration(other, time) < _duration(order, time) - TICK
+        if is_better and keeps_rest(other, group, own, time, rest):
             order, in_vain = other, 0
     return order
 

@@ -242,6 +242,20 @@ class PartPlan:
         return len(self.plans) * self.pierce_time
 
     @property
+    def rests(self) -> Array:
+        """Time (G, G) s from the end of each contour to the beginning of every later one.
+
+        Its retract and the approach of the other are left out; the lower triangle is zero.
+        """
+        here = len(self.moves) - len(self.plans) + 1  # with a home, the first move comes from there
+        own = [p.time[-1] - p.time[0] + self.pierce_time for p in self.plans]
+        down_and_up = 2 * self.retract / self.approach_speed
+        took = np.array([m.duration for m in self.moves[here // 2 :]][: len(self.plans) - 1])
+        begin = np.append(0.0, np.cumsum(np.array(own[:-1]) + down_and_up + took))
+        end = begin + own + down_and_up
+        return np.triu(begin[None] - end[:, None], 1)
+
+    @property
     def cycle_time(self) -> float:
         """Time for cutting, transfer moves and piercing together (s)."""
         return self.cutting_time + self.air_time + self.piercing_time
@@ -254,6 +268,7 @@ class OrderKeywords(TypedDict, total=False):
     cell: Cell | None
     before: Sequence[tuple[int, int]]
     heat_spacing: float
+    heat_time: float
     given_order: bool
     retract: float
     approach_speed: float
@@ -276,6 +291,9 @@ class OrderOptions:
         Contour i is cut before contour j; see `inner_first`.
     heat_spacing : float m
         Contours nearer to each other than this are not cut directly one after the other.
+    heat_time : float s
+        Instead, they may follow each other after this time, from the end of one to the beginning of
+        the other, retract and approach left out; 0: no time is long enough.
     given_order : bool
         Keep the order of the candidates.
     retract, approach_speed : float m, m/s
@@ -298,6 +316,7 @@ class OrderOptions:
     cell: Cell | None = None
     before: Sequence[tuple[int, int]] = ()
     heat_spacing: float = 0.0
+    heat_time: float = 0.0
     given_order: bool = False
     retract: float = 0.05
     approach_speed: float = 0.1
@@ -313,6 +332,7 @@ class OrderOptions:
         speed = scalar(self.approach_speed, "approach_speed", unit="m/s", above=0.0)
         _set(self, "approach_speed", speed)
         _set(self, "heat_spacing", not_negative(self.heat_spacing, "heat_spacing", unit="m"))
+        _set(self, "heat_time", not_negative(self.heat_time, "heat_time", unit="s"))
         _set(self, "pierce_time", not_negative(self.pierce_time, "pierce_time", unit="s"))
         _set(self, "air_speed", scalar(self.air_speed, "air_speed", above=0.0))
 
@@ -348,8 +368,8 @@ def plan_part(
     speed : float m/s, or one for each contour
     progress : callable, optional
         Called with the number of candidates planned since the last call.
-    home, cell, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
-    seconds
+    home, cell, before, heat_spacing, heat_time, given_order, retract, approach_speed, air_speed,
+    pierce_time, seconds
         As in `order_plans`; the plans are also clear in the cell.
 
     Raises
@@ -715,12 +735,15 @@ def order_plans(
             if air is None
             else air.extended(plans, group)
         )
-        air.forbid(warm[np.ix_(group, group)])
+        if not options.heat_time:
+            air.forbid(warm[np.ix_(group, group)])
         if home is not None and air.home is None:
             air.home = home
         own = np.array([p.time[-1] - p.time[0] for p in plans])
         own += options.pierce_time + 2 * options.retract / options.approach_speed
-        found = _settle_order(air, group, own, before, options.seconds)
+        found = _settle_order(
+            air, group, own, before, np.where(warm, options.heat_time, 0.0), options.seconds
+        )
         if not isinstance(found, NoFeasiblePath):
             order = found
             break
@@ -751,15 +774,16 @@ def longest_search(seconds: float) -> float:
 
 
 def _settle_order(
-    air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
-) -> Order | NoFeasiblePath:
+    air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], rest: Array,
+    seconds: float,
+) -> Order | NoFeasiblePath:  # fmt: skip
     """Return the best order in which every move has a way, or why none is found."""
     failed = len(air.failed)
     while len(air.failed) - failed < PATIENCE:
         try:
             order = best_order(
                 group, own, air.between,
-                first=air.first, last=air.last, before=before, seconds=seconds,
+                first=air.first, last=air.last, before=before, rest=rest, seconds=seconds,
             )  # fmt: skip
         except NoFeasiblePath as none:
             return air.why_no_order(none)

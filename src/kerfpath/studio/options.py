@@ -82,6 +82,7 @@ def _groups() -> dict[str, tuple[OptionField, ...]]:
             _field("sequence.order", "Order", needs="sequence"),
             _field("sequence.inner_first", "Inner contours first", needs="sequence"),
             _field("sequence.heat_spacing_mm", "Heat spacing", needs="sequence"),
+            _field("sequence.heat_time_s", "Heat time", needs="sequence"),
             _field("sequence.seconds", "Time limit for the order", needs="sequence"),
             _field("sequence.home_deg", "Home", needs="sequence", kind="joints"),
         ),

@@ -202,3 +202,26 @@ def test_a_fault_of_the_program_names_its_key_and_its_line(tmp_path):
     [fault] = said(job(tmp_path, [(0, "one", 0.5)], own))
     lines = (tmp_path / "cut_holes.toml").read_text().splitlines()
     assert f"cut_holes.toml:{lines.index('[program.inform]') + 1}: program.inform.gas" in fault
+
+
+def test_near_contours_are_cut_after_their_time_and_the_audit_measures_it(tmp_path):
+    holes = [(0, "a", 1), (20, "b", 1), (90, "c", 1), (110, "d", 1)]
+    asked = "[sequence]\nheat_spacing_mm = 30\nheat_time_s = {}\n"
+    path = job(tmp_path, holes, asked.format(2)).path
+    done = run("plan", path, "--out", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert run("audit", "out/plan.json", cwd=tmp_path).returncode == 0
+    text = path.read_text()
+    path.write_text(text.replace("heat_time_s = 2", "heat_time_s = 100"))
+    refused = run("audit", "out/plan.json", "--job", path, cwd=tmp_path)
+    assert refused.returncode == 1
+    assert "contours cut within 100 s after one that is too near" in " ".join(
+        refused.stdout.split()
+    )
+    none = run("plan", path, "--out", "none", cwd=tmp_path)
+    assert none.returncode == 1
+    assert "the time between near ones" in " ".join((none.stdout + none.stderr).split())
+    path.write_text(text.replace("heat_spacing_mm = 30\n", ""))
+    fault = run("check", path, cwd=tmp_path)
+    assert fault.returncode == 2
+    assert "sequence.heat_time_s: expected heat_spacing_mm with heat_time_s" in fault.stderr

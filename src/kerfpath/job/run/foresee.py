@@ -261,6 +261,8 @@ def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
     job, sequence = prepared.job, prepared.job.sequence
     if sequence is None or not sequence.heat_spacing_mm or job.options.interruptions != "none":
         return
+    if sequence.heat_time_s:
+        return  # how long the cuts between take is not known yet
     between = distances_between([request.candidates[0].nodes for request in prepared.contours])
     spacing = sequence.heat_spacing_mm / 1000
     if _has_order(prepared, between < spacing):

@@ -105,6 +105,7 @@ def order_cuts(
             cell=prepared.cell,
             before=before,
             heat_spacing=job.sequence.heat_spacing_mm / 1000,
+            heat_time=job.sequence.heat_time_s,
             given_order=job.sequence.order == "given",
             retract=job.program.retract,
             air_speed=job.program.air_speed or 1.0,

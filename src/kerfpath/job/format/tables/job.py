@@ -344,10 +344,18 @@ class SequenceTable(Table):
     ] = "best"
     inner_first: Annotated[bool, key("true or false", "true")] = True
     heat_spacing_mm: Annotated[NotNegative, key("a number not below 0, in mm", "40")] = 0.0
+    heat_time_s: Annotated[NotNegative, key("a number not below 0, in s", "20")] = 0.0
     home_deg: Annotated[
         Joints | None, key("one number for every joint, in deg", "[0, -20, 10, 0, 60, 0]")
     ] = None
     seconds: Annotated[Positive, key("a number above 0, in s", "10")] = 10.0
+
+    @model_validator(mode="after")
+    def _time_for_neighbours(self) -> SequenceTable:
+        if self.heat_time_s and not self.heat_spacing_mm:
+            remedy = "add heat_spacing_mm, the distance of contours that heat each other"
+            raise fault("heat_spacing_mm with heat_time_s", "none", remedy, ("heat_time_s",))
+        return self
 
 
 # -----------------------------------------------------------------------------
