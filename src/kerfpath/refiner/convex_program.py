@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy import sparse
 
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.refiner.rates import LinearAcceleration, LinearTorque, RateLimits
-from kerfpath.refiner.rows import ConstraintRows, Sparse, span_of, wide
+from kerfpath.refiner.rows import ConstraintRows, Rows
 from kerfpath.search import Metric
 
 Target = Literal["sum", "max", "excess", "lost"]
@@ -98,90 +97,66 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     free = model.radius.shape
     rows = ConstraintRows(size := model.radius.size)
     dq, D = np.diff(model.q, axis=0), _increments(model)
-    beyond = None
-    if target in ("excess", "lost"):
-        beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.meetings[0]))
-    _limits(rows, dq, D, model, rates, beyond)
+    beyond = _limits(rows, dq, D, model, rates, target)
     _ranges(rows, model)
+    unknown = np.arange(size)[:, None]
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
-        rows.hold(sign * sparse.eye_array(size, format="csr"), bound.ravel())
+        rows.hold(Rows(np.full((size, 1), sign), unknown), bound.ravel())
     if target == "excess":
-        cost = np.zeros(size)
+        cost = np.zeros(rows.variables)
     else:
         cost = _cost(rows, dq, D, model, minimax=target == "max")
-    if beyond is not None:
-        price = (1.0 if target == "excess" else PRICE) * beyond.sum(axis=0)
-        cost = np.pad(cost, (0, rows.variables - len(cost)))
-        cost[: len(price)] += price
+    cost[beyond] += 1.0 if target == "excess" else PRICE
     equal = None
     if rates.periodic:
-        each, last = np.arange(free[1]), size - free[1]
-        values = np.concatenate([model.radius[0], -model.radius[-1]])
-        columns = np.concatenate([each, last + each])
-        equal = _matrix(values, np.tile(each, 2), columns, (free[1], size))
+        first = unknown[: free[1]]
+        last = first + size - free[1]
+        equal = Rows(model.radius[0][:, None], first).beside(-model.radius[-1][:, None], last)
     x = rows.solve(cost, equal)
     if x is None:
         return None
     return np.clip(x[:size].reshape(free), model.least, model.most) * model.radius
 
 
-def _matrix(values: Array, row: Ints, column: Ints, shape: tuple[int, int]) -> Sparse:
-    return sparse.csr_array((values, (row, column)), shape=shape)
-
-
-def _scaled(factors: Array, matrix: Sparse) -> Sparse:
-    """Multiply the rows of a matrix by factors."""
-    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
-    return sparse.csr_array((data, matrix.indices, matrix.indptr), matrix.shape)
-
-
-def _less(rows: Sparse, one: Sparse) -> Sparse:
-    """Subtract a single row from each of the rows; it has at least as many unknowns as they."""
-    return wide(rows, one.shape[1]) - sparse.csr_array(np.ones((rows.shape[0], 1))) @ one
-
-
-def _increments(model: LinearModel) -> Sparse:
-    """Return the slopes ((K-1) n, K F) of the increments, edge after edge."""
+def _increments(model: LinearModel) -> Rows:
+    """Return the slopes ((K-1) n) of the increments by the unknowns, edge after edge."""
     n, slopes = model.q.shape[1], _slopes(model)
-    return slopes[n:] - slopes[:-n]
+    ahead = slopes.of(slice(n, None))
+    return (-slopes.of(slice(-n))).beside(*ahead)
 
 
-def _slopes(model: LinearModel) -> Sparse:
-    """Return the slopes (K n, K F) of the joints by the unknowns, node after node."""
+def _slopes(model: LinearModel) -> Rows:
+    """Return the slopes (K n) of the joints by the unknowns, node after node."""
     K, n, F = model.slope.shape
-    values = (model.slope * model.radius[:, None]).ravel()
-    row = np.repeat(np.arange(K * n), F)
-    column = (row // n) * F + np.tile(np.arange(F), K * n)
-    return _matrix(values, row, column, (K * n, K * F))
+    values = (model.slope * model.radius[:, None]).reshape(K * n, F)
+    return Rows(values, np.repeat(_unknowns(np.arange(K), F), n, axis=0))
+
+
+def _unknowns(node: Ints, F: int) -> Ints:
+    """Return the unknowns (m, F) of nodes (m,)."""
+    return np.asarray(node[:, None] * F + np.arange(F))
 
 
 def _limits(
-    rows: ConstraintRows,
-    dq: Array,
-    D: Sparse,
-    model: LinearModel,
-    rates: RateLimits,
-    beyond: Sparse | None,
-) -> None:
-    """Add the limits (5), (6), on torques and on jerks, with an excess `beyond` if it is unknown.
+    rows: ConstraintRows, dq: Array, D: Rows, model: LinearModel, rates: RateLimits, target: Target
+) -> Ints:
+    """Add the limits (5), (6), on torques and jerks; return the unknowns of the excess over them.
 
-    The excess is one unknown for all, or one for each interval and then each node, not negative.
+    The excess is one unknown for all (target "excess"), or one for each interval and each node that
+    may exceed a limit ("lost"), not negative; else there is none.
     """
     edges, n = dq.shape
     meetings, (v, a) = rates.meetings, rates.of(dq)
     span = (rates.tau[meetings[0]] + rates.tau[meetings[1]]) / 2
-    owner = np.zeros(edges + len(span), np.int64)
-    if beyond is not None and beyond.shape[0] > 1:
-        owner = np.arange(len(owner))
-        rows.hold(-beyond, np.zeros(len(owner)))
-    V = _scaled(np.repeat(1 / rates.tau, n), D)
+    owner = np.arange(edges + len(span))
+    V = D.scaled(np.repeat(1 / rates.tau, n))
     joints = np.arange(n)
     before, after = ((joints + n * at[:, None]).ravel() for at in meetings)
-    A = _scaled(np.repeat(1 / span, n), V[after] - V[before])
+    A = (-V.of(before)).plus(V.of(after)).scaled(np.repeat(1 / span, n))
     most = model.acceleration.limit
     held = [
-        (v / rates.velocity, _scaled(1 / rates.velocity.ravel(), V), owner[:edges]),
-        (a / most, _scaled(1 / most.ravel(), A), owner[edges:]),
+        (v / rates.velocity, V.scaled(1 / rates.velocity.ravel()), owner[:edges]),
+        (a / most, A.scaled(1 / most.ravel()), owner[edges:]),
     ]
     # What the limit itself gains, in shares of it, is taken off on both sides.
     gained = _accelerations(model, model.acceleration)
@@ -190,106 +165,127 @@ def _limits(
     if rates.limits.jerk is not None and len(jerk := rates.jerk_share(dq)):
         over = meetings[1][: len(jerk)]
         here = (joints + n * np.arange(len(jerk))[:, None]).ravel()
-        there = (here + n) % A.shape[0]
+        there = (here + n) % len(A.value)
         per = np.outer(1 / rates.tau[over], 1 / rates.limits.jerk.usable).ravel()
-        held.append((jerk, _scaled(per, A[there] - A[here]), owner[:edges][over]))
-    for i, (value, per_share, of) in enumerate(held):
-        share = value.ravel()
-        for sign in (1.0, -1.0):
-            used = sign * per_share
-            if i == 1 and gained is not None:
-                used = used - gained
-            if beyond is None:
-                rows.at_most(sign * share, used, 1 - MARGIN)
-            else:
-                spread = beyond[np.repeat(of, n)]
-                rows.hold(wide(used, rows.variables) - spread, 1 - sign * share)
+        change = (-A.of(here)).plus(A.of(there))
+        held.append((jerk, change.scaled(per), owner[:edges][over]))
+    used = [
+        (sign * value.ravel(), per_share if sign > 0 else -per_share, np.repeat(of, n))
+        for value, per_share, of in held
+        for sign in (1.0, -1.0)
+    ]
+    if gained is not None:
+        used[2:4] = [(share, slope.plus(-gained), of) for share, slope, of in used[2:4]]
+    if target in ("sum", "max"):
+        for share, slope, _ in used:
+            rows.at_most(share, slope, 1 - MARGIN)
+        return rows.new(0)
+    # Shares that stay below 1, or below what another one needs at least, do not count.
+    least = 1.0
+    if target == "excess":
+        least = max(float((share - slope.span).max(initial=-np.inf)) for share, slope, _ in used)
+    some = [share + slope.span >= least for share, slope, _ in used]
+    place = np.concatenate([of[kept] for (_, _, of), kept in zip(used, some, strict=True)])
+    if target == "excess":
+        beyond = rows.new(1)
+        unknown = np.zeros(len(owner), np.int64) + beyond
+    else:
+        places = np.unique(place)
+        beyond = rows.new(len(places))
+        unknown = np.zeros(len(owner), np.int64)
+        unknown[places] = beyond
+        rows.hold(Rows(-np.ones((len(beyond), 1)), beyond[:, None]), np.zeros(len(beyond)))
+    for (share, slope, of), kept in zip(used, some, strict=True):
+        rows.hold(slope.of(kept).beside(-1.0, unknown[of[kept]][:, None]), 1 - share[kept])
+    return beyond
 
 
-def _accelerations(model: LinearModel, limit: LinearAcceleration) -> Sparse | None:
-    """Return the slopes (M n, K F) of the acceleration limits as shares of them; None: constant."""
+def _accelerations(model: LinearModel, limit: LinearAcceleration) -> Rows | None:
+    """Return the slopes (M n) of the acceleration limits as shares of them; None: constant."""
     if not limit.slope.any():
         return None
     M, n, F = limit.slope.shape
     values = limit.slope * model.radius[limit.node, None] / limit.limit[..., None]
-    row = np.repeat(np.arange(M * n), F)
-    column = np.repeat(limit.node, n * F) * F + np.tile(np.arange(F), M * n)
-    return _matrix(values.ravel(), row, column, (M * n, model.radius.size))
+    return Rows(values.reshape(M * n, F), np.repeat(_unknowns(limit.node, F), n, axis=0))
 
 
-def _torques(model: LinearModel, torque: LinearTorque) -> Sparse:
-    """Return the slopes (M n, K) of the shares of torque limits by gamma, node after node."""
+def _torques(model: LinearModel, torque: LinearTorque) -> Rows:
+    """Return the slopes (M n) of the shares of torque limits by gamma, node after node."""
     values = torque.slope * model.radius[torque.column]
-    m, n = torque.share.shape
-    row = np.tile(np.arange(m * n), 3)
-    column = np.repeat(torque.column.ravel(), n)
-    return _matrix(values.ravel(), row, column, (m * n, len(model.q)))
+    n = torque.share.shape[1]
+    return Rows(values.reshape(len(values), -1).T, np.repeat(torque.column.T, n, axis=0))
 
 
 def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
     """Add the ranges of joints, rotation limits and couplings."""
-    K, n = model.q.shape
+    K, n, F = model.slope.shape
     one = _slopes(model)
     rows.at_most(model.q.ravel(), one, np.tile(model.upper, K))
     rows.at_most(-model.q.ravel(), -one, np.tile(-model.lower, K))
     if np.isfinite(model.rotation).any():
-        away = one - sparse.vstack([one[:n]] * K, format="csr")
-        for sign in (1.0, -1.0):
-            turned = sign * (model.q - model.q[0]).ravel()
-            rows.at_most(turned, sign * away, np.tile(model.rotation, K))
+        away = one.plus(-one.of(np.tile(np.arange(n), K)))
+        for used, turned in ((away, model.q - model.q[0]), (-away, model.q[0] - model.q)):
+            rows.at_most(turned.ravel(), used, np.tile(model.rotation, K))
     for row, lower, upper in zip(model.rows, model.row_lower, model.row_upper, strict=True):
-        both = sparse.kron(sparse.eye_array(K), row[None], format="csr") @ one
+        both = Rows(row @ one.value.reshape(K, n, F), _unknowns(np.arange(K), F))
         rows.at_most(model.q @ row, both, upper)
         rows.at_most(-(model.q @ row), -both, -lower)
 
 
-def _cost(rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel, minimax: bool) -> Array:
+def _cost(rows: ConstraintRows, dq: Array, D: Rows, model: LinearModel, minimax: bool) -> Array:
     """Return the coefficients of the objective: the sum of the distances, or the largest."""
     lengths, constant = _lengths(rows, dq, D, model)
     if model.cap < np.inf:
         rows.hold(lengths, model.cap - constant)
     if not minimax:
-        return np.asarray(lengths.sum(axis=0))
+        at, value = lengths.column.ravel(), lengths.value.ravel()
+        return np.bincount(at, value, rows.variables).astype(np.float64, copy=False)
     largest = rows.new(1)
-    rows.hold(_less(lengths, largest), -constant)
-    return np.asarray(largest.sum(axis=0))
+    rows.hold(lengths.beside(-1.0, np.tile(largest, (len(constant), 1))), -constant)
+    cost = np.zeros(rows.variables)
+    cost[largest] = 1.0
+    return cost
 
 
-def _lengths(
-    rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel
-) -> tuple[Sparse, Array]:
-    """Return upper bounds on the distances rho, as lengths (K-1, any) @ x + constant (K-1,)."""
+def _lengths(rows: ConstraintRows, dq: Array, D: Rows, model: LinearModel) -> tuple[Rows, Array]:
+    """Return upper bounds on the distances rho, as lengths (K-1) @ x + constant (K-1,)."""
     edges, n = dq.shape
     value = (model.weight * dq).ravel()
-    slope, edge = _scaled(np.tile(model.weight, edges), D), np.repeat(np.arange(edges), n)
-    reach = span_of(slope)
+    slope, edge = D.scaled(np.tile(model.weight, edges)), np.repeat(np.arange(edges), n)
+    reach = slope.span
     if model.metric == "manhattan":
         # Where no step reverses a joint, its absolute value is linear.
-        turns = np.flatnonzero(np.abs(value) <= reach)
+        turns = np.abs(value) <= reach
         sign = np.sign(value)
         sign[turns] = 0.0
-        total = _matrix(sign, edge, np.arange(edges * n), (edges, edges * n))
-        part = rows.new(len(turns))
-        _absolute(rows, value[turns], slope[turns], part)
-        parts = _matrix(
-            np.ones(len(turns)), edge[turns], np.arange(len(turns)), (edges, len(turns))
-        )
-        return wide(total @ slope, rows.variables) + parts @ part, total @ value
+        total = slope.scaled(sign).value.reshape(edges, n, -1).sum(axis=1)
+        part = np.zeros(edges * n, np.int64)
+        part[turns] = rows.new(int(turns.sum()))
+        _absolute(rows, value[turns], slope.of(turns), part[turns])
+        parts = np.where(turns, 1.0, 0.0).reshape(edges, n), part.reshape(edges, n)
+        constant = (sign * value).reshape(edges, n).sum(axis=1)
+        return Rows(total, slope.column[::n]).beside(*parts), constant
     length = rows.new(edges)
     if model.metric == "chebychev":
         # A joint that stays below the least value of another one cannot be the largest.
         least = np.maximum(np.abs(value) - reach, 0).reshape(edges, n).max(axis=1)
         can = np.flatnonzero(np.abs(value) + reach >= least[edge])
-        _absolute(rows, value[can], slope[can], length[edge[can]])
+        _absolute(rows, value[can], slope.of(can), length[edge[can]])
     else:
-        blocks = sparse.vstack([length, wide(slope, rows.variables)], format="csr")
-        parts_of = edges + np.arange(edges * n).reshape(edges, n)
-        order = np.column_stack([np.arange(edges), parts_of]).ravel()
-        rows.cone(blocks[order], np.append(np.zeros(edges), value)[order], n + 1)
-    return length, np.zeros(edges)
+        first = np.zeros((edges, 1, slope.value.shape[1]))
+        first[..., 0] = 1.0
+        columns = np.zeros(first.shape, np.int64)
+        columns[:, 0, 0] = length
+        blocks = [
+            np.concatenate([own, each.reshape(edges, n, -1)], axis=1).reshape(edges * (n + 1), -1)
+            for own, each in zip((first, columns), slope, strict=True)
+        ]
+        constant = np.column_stack([np.zeros(edges), value.reshape(edges, n)]).ravel()
+        rows.cone(Rows(*blocks), constant, n + 1)
+    return Rows(np.ones((edges, 1)), length[:, None]), np.zeros(edges)
 
 
-def _absolute(rows: ConstraintRows, value: Array, slope: Sparse, above: Sparse) -> None:
-    """Add |value + slope x| <= above x."""
-    rows.hold(wide(slope, rows.variables) - above, -value)
-    rows.hold(-wide(slope, rows.variables) - above, value)
+def _absolute(rows: ConstraintRows, value: Array, slope: Rows, above: Ints) -> None:
+    """Add |value + slope x| <= the unknowns `above` (m,)."""
+    rows.hold(slope.beside(-1.0, above[:, None]), -value)
+    rows.hold((-slope).beside(-1.0, above[:, None]), value)
