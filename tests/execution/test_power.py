@@ -17,6 +17,7 @@ from kerfpath.post import (
     ProgramOptions,
     ReadMove,
     ReadPower,
+    ReadWait,
     SetPower,
     build_program,
     dry_run,
@@ -103,6 +104,47 @@ def test_the_power_is_that_of_the_pierce_then_of_the_cut_and_zero_in_the_air(nam
     assert read_shares == pytest.approx(shares, abs=1e-3)
     before = next(k for k, s in enumerate(read.steps) if isinstance(s, ReadPower))
     assert isinstance(read.steps[before + 1], ReadMove), "the approach follows"
+
+
+STAGES = ((0.4, 0.2), (0.8, 0.1), (0.6, 0.3))
+
+
+@pytest.mark.parametrize("name", [*POWER, "inform"])
+def test_the_stages_of_a_pierce_follow_each_other_at_the_start(name):
+    by = {} if name in POWER else BY_CONTROLLER[name][0]
+    case = CASES[name]
+    options = ProgramOptions(
+        language=name, settings=case.language.settings(**case.options, **(by or POWER[name])),
+        power_by_speed=((0.0, 0.0), (1.0, 1.0)), pierce_stages=STAGES, lead_time=0.0,
+        power_follows="controller" if by else "steps",
+    )  # fmt: skip
+    assert options.pierce_time == pytest.approx(0.6)
+    program = with_power(build_program([dipping(case)], options), options)
+    _, read = case.reads_back(program, options.settings)
+    now, found = 0.0, []
+    for step in read.steps:
+        now = step.share if isinstance(step, ReadPower) else now
+        if isinstance(step, ReadWait):
+            found.append((now, step.time))
+    assert found == [pytest.approx(stage, abs=1e-3) for stage in STAGES]
+    assert unsafe_paths(read) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"pierce_stages": ((1.2, 0.2),)}, "powers above 0, at most 1, got 1.2"),
+        ({"pierce_stages": ((0.4, 0.0),)}, "above 0 and at most 60 s, got 0 s"),
+        ({"pierce_stages": ()}, "1 to 20 of them, got 0"),
+        ({"pierce_stages": ((0.4,),)}, "expected pairs"),
+        ({"pierce_stages": STAGES, "pierce_time": 0.3}, "no other time or power"),
+        ({"pierce_stages": STAGES, "pierce_power": 0.3}, "no other time or power"),
+        ({"pierce_stages": STAGES, "power_by_speed": None}, "expected power_by_speed"),
+    ],
+)
+def test_stages_that_are_none_are_refused(more, words):
+    with pytest.raises(InputError, match=words):
+        ProgramOptions(**{"power_by_speed": CURVE, **more})
 
 
 @pytest.mark.parametrize("name", WITHOUT)

@@ -615,3 +615,50 @@ def test_the_sheet_of_a_job_without_process_is_empty(job):
     read = job("", edit=lambda text: text.replace("spacing_mm", "speed_m_min = 3\nspacing_mm"))
     assert sheet_of(read.source) == ()
     assert origins_of(read.text, read.source) == ()
+
+
+POWERED = """\
+source = "cut trials"
+[[row]]
+material = "steel"
+thickness_mm = 2
+speed_m_min = 6
+power_w = 3000
+power_by_speed = [[0.0, 0.3], [1.0, 1.0]]
+pierce = [{ time_s = 0.2, power_w = 1200, height_mm = 4 }, { time_s = 0.1, power_w = 2400 }]
+"""
+
+
+def powered(tmp_path, program):
+    """The job of a chart with powers, with these lines at its end."""
+    (tmp_path / "powered.toml").write_text(POWERED)
+    (tmp_path / "b_pillar.step").symlink_to(DEMO / "b_pillar.step")
+    process = '[process]\nmaterial = "steel"\nthickness_mm = 2\nchart = "powered.toml"\n'
+    text = re.sub(r"^speed_m_min.*\n", "", SMALL, flags=re.MULTILINE)
+    text = text.replace("[[contour]]", f"{process}\n[[contour]]", 1)
+    path = tmp_path / "job.toml"
+    path.write_text(text + program)
+    return read_job(path)
+
+
+def test_power_and_stages_of_a_chart_are_set_where_an_output_is_named(tmp_path):
+    job = powered(tmp_path, '[program.rapid]\npower_output = "aoPower"\npower_full = 10.0\n')
+    assert job.program.power_by_speed == ((0.0, 0.3), (1.0, 1.0))
+    assert job.program.pierce_stages == ((0.4, 0.2), (0.8, 0.1))
+    assert job.program.pierce_time == pytest.approx(0.3)
+    sheet = " ".join(job.program.remarks)
+    assert "power 3000 W" in sheet
+    assert "pierce 1: 4 mm high" in sheet
+    assert "pierce 2" not in sheet
+    assert "by speed" not in sheet
+    origins = {each.key: each.origin for each in origins_of(job.text, job.source)}
+    assert origins["pierce_stages"] == origins["power_by_speed"] == "powered.toml row 1"
+
+
+def test_power_and_stages_of_a_chart_are_for_the_operator_without_an_output(tmp_path):
+    job = powered(tmp_path, "")
+    assert job.program.power is None
+    assert job.program.pierce_time == pytest.approx(0.3)
+    sheet = " ".join(job.program.remarks)
+    assert "power by speed" in sheet
+    assert "pierce 2: 0.1 s 2400 W" in sheet

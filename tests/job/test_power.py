@@ -39,7 +39,7 @@ TRIGGERED = r"\\T\d:=trPower\w+| TB +[\d.]+sec,AO\[\d\]=\d+|,trPower\w+|power [\
 
 def job_text(name, more=CURVE):
     arm, chosen = ARMS.get(name, ARM), languages()[name]
-    text = JOB.format(
+    text = (JOB.replace("pierce_time_s = 0.25\n", "") if "stages" in more else JOB).format(
         arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900, language=name,
         lead=0.01 if chosen.ahead else 0.0, more=more, external="",
     )  # fmt: skip
@@ -47,6 +47,10 @@ def job_text(name, more=CURVE):
     return text.replace(table, table + POWER[name]) if table in text else text
 
 
+STAGED = """\
+power_by_speed = [[0.0, 0.3], [1.0, 1.0]]
+pierce_stages = [[0.4, 0.2], [0.8, 0.1], [0.6, 0.3]]
+"""
 LINE = (
     'power_by_speed = [[0.0, 0.0], [1.0, 0.9]]\npierce_power = 0.55\npower_follows = "controller"\n'
 )
@@ -66,6 +70,11 @@ def subjects(tmp_path_factory):
 @pytest.fixture(scope="module")
 def by_controller(tmp_path_factory):
     return made_subjects(tmp_path_factory.mktemp("controller"), BY_CONTROLLER, LINE)
+
+
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory):
+    return made_subjects(tmp_path_factory.mktemp("staged"), STEPS, STAGED)
 
 
 def made_subjects(folder, names, more):
@@ -189,6 +198,43 @@ def test_a_power_that_is_left_out_or_stays_on_does_not_pass(subjects, name):
         assert subject.outcome(without)[0] != "passed", line
         tried += 1
     assert tried >= 2
+
+
+WAITS = {
+    "rapid": r"WaitTime ([\d.]+)",
+    "krl": r"WAIT SEC ([\d.]+)",
+    "fanuc": r"WAIT +(\.\d\d)\(sec\)",
+    "urscript": r"sleep\(([\d.]+)\)",
+    "linuxcnc": r"G4 P([\d.]+)",
+}
+"""The lines that wait, and their times."""
+
+
+@pytest.mark.parametrize("name", WAITS)
+def test_a_staged_pierce_passes_and_no_edit_of_a_stage_does(staged, name):
+    """Each stage has another time, two of them change places, one is left out."""
+    subject = staged[name]
+    assert subject.outcome(subject.files) == ("passed", "")
+    (file, first), *_ = [
+        (file, k)
+        for file, text in subject.files.items()
+        for k, line in enumerate(text.split("\n"))
+        if re.search(WAITS[name], line)
+    ]
+    lines = subject.files[file].split("\n")
+    waits = [k for k in range(first, first + 5) if re.search(WAITS[name], lines[k])]
+    assert len(waits) == 3
+    found = [re.search(WAITS[name], lines[k]) for k in waits]
+    swapped = list(lines)
+    swapped[waits[0]], swapped[waits[1]] = lines[waits[1]], lines[waits[0]]
+    texts = [swapped, [*lines[: waits[1] - 1], *lines[waits[1] + 1 :]]]
+    for k, match in zip(waits, found, strict=True):
+        time = f"{float(match[1]) + 0.05:.{len(match[1].partition('.')[2])}f}".lstrip("0")
+        other = f"{lines[k][: match.start(1)]}{time}{lines[k][match.end(1) :]}"
+        texts.append([*lines[:k], other, *lines[k + 1 :]])
+    for text in texts:
+        said = subject.outcome({**subject.files, file: "\n".join(text)})
+        assert said[0] != "passed", set(text) ^ set(lines)
 
 
 @pytest.mark.slow

@@ -224,32 +224,32 @@ def _with_power(
     approach, *cut, retract = (move for move in section.moves if isinstance(move, LinearMove))
     powers = dict(zip(cut, along.set.tolist(), strict=True))
     after = dict(pairwise([*cut, None]))
-    pierces = any(isinstance(step, Wait) for step in section.steps)
-    if law.follows == "controller":
-        lead = options.lead_time if options.robot_language.ahead else 0.0
-        slope = law.proportional / max(move.speed for move in cut)
-        begin = SetPower(share=law.piercing if pierces else 0.0)
-        set_at: dict[Step, SetPower] = {
-            approach: begin,
-            cut[0]: SetPower(share=0.0, per_speed=slope, lead_time=lead),
-            retract: SetPower(share=0.0),
-        }
-        moved = ([*([set_at[s]] if s in set_at else []), s] for s in section.steps)
-        return replace(section, steps=tuple(step for some in moved for step in some))
-    now = law.piercing if pierces else powers[cut[0]]
+    stages = [share for share, _ in options.pierce]
+    by_controller = law.follows == "controller"
+    lead = options.lead_time if options.robot_language.ahead else 0.0
+    slope = law.proportional / max(move.speed for move in cut)
+    now = (stages or [0.0 if by_controller else powers[cut[0]]])[0]
+    later = iter(stages[1:])
+    waits = 0
     steps: list[Step] = []
     for step in section.steps:
         if step is approach:
             steps.append(SetPower(share=now))
+        elif isinstance(step, Wait):
+            waits += 1
+            share = next(later, now) if waits > 1 else now
+            steps += [SetPower(share=share)] if share != now else []
+            now = share
+        elif step is cut[0] and by_controller:
+            steps.append(SetPower(share=0.0, per_speed=slope, lead_time=lead))
         elif step is cut[0] and now != powers[cut[0]]:
             now = powers[cut[0]]
             steps.append(SetPower(share=now))
         elif step is retract:
             steps.append(SetPower(share=0.0))
-        following = after.get(step) if isinstance(step, LinearMove) else None
-        if isinstance(step, LinearMove) and following is not None and powers[following] != now:
-            now = powers[following]
-            lead = options.lead_time if options.robot_language.ahead else 0.0
+        other = None if by_controller or not isinstance(step, LinearMove) else after.get(step)
+        if isinstance(step, LinearMove) and other is not None and powers[other] != now:
+            now = powers[other]
             change = Switch(signal="power", on=now > 0, lead_time=lead, share=now)
             step = replace(step, switches=(*step.switches, change))
         steps.append(step)

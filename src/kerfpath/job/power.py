@@ -20,6 +20,8 @@ from kerfpath.post import (
     ReadProgram,
     ReadSection,
     ReadStep,
+    laser_start,
+    waits_at_start,
 )
 
 SAME_POWER = 2e-3
@@ -85,8 +87,6 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
         same = np.abs(slope[1:-1] * full - law.proportional) <= SAME_POWER
         wrong = ~same | (said[1:-1] > 0)
     k = int(np.argmax(off))
-    pierce = [abs(_while_waiting(group, wait.line) - law.piercing)
-              for at, wait in group.waits if at == 1]  # fmt: skip
     lead = job.program.lead_time if job.program.robot_language.ahead else 0.0
     late = [abs(s.lead_time - lead) for _, s in switched]
     late += [abs(power.lead_time - lead) for _, power in group.powers if power.per_speed]
@@ -102,8 +102,8 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
         count_at("power-steps", "moves whose power is not of the job's steps or line",
                  [int(ends[i]) for i in np.flatnonzero(wrong)]),
         count_at("power-standing", "settings of the power where the robot moves", odd),
-        check("power-pierce", "difference of the power at the pierce from the job's",
-              max(pierce, default=0.0), SAME_POWER, "share"),
+        check("power-pierce", "difference of a stage of the pierce from the job's",
+              _off_stages(job, group), SAME_POWER, "share"),
         check("power-lead", "difference of the power's lead time from the job's",
               max(late, default=0.0), SAME_LEAD, "s"),
         check("power-off", "power while the tool backs off",
@@ -128,8 +128,38 @@ def _in_moves(group: ReadGroup) -> Array:
     return np.array(found).T
 
 
-def _while_waiting(group: ReadGroup, line: int) -> float:
-    """Return the share of the full power while the robot waits at the start, at a line."""
+def _off_stages(job: Job, group: ReadGroup) -> float:
+    """Return by how much a share of the power differs in the stages of the pierce; 1 if times do.
+
+    Waits at one power are one stage.
+    """
+    asked = [share for share, _ in job.program.pierce]
+    waits = waits_at_start(job.program, laser_start(job.program)[1]) if asked else []
+    said = [(_at(group, wait.line), wait.time) for at, wait in group.waits if at == 1]
+    expected, found = _merged(list(zip(asked, waits, strict=True))), _merged(said)
+    if not asked:
+        return 0.0
+    if len(expected) != len(found):
+        return 1.0
+    pairs = list(zip(expected, found, strict=True))
+    if any(abs(one[1] - two[1]) > SAME_LEAD for one, two in pairs):
+        return 1.0
+    return max(abs(one[0] - two[0]) for one, two in pairs)
+
+
+def _merged(stages: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return stages (share, s), those at one power that follow each other as one."""
+    found: list[tuple[float, float]] = []
+    for share, time in stages:
+        if found and abs(found[-1][0] - share) <= SAME_POWER:
+            found[-1] = (share, found[-1][1] + time)
+        else:
+            found.append((share, time))
+    return found
+
+
+def _at(group: ReadGroup, line: int) -> float:
+    """Return the share of the full power where the robot waits at the start, at a line."""
     now = 0.0
     for at, power in group.powers:
         if at == 0 or (at == 1 and power.line < line):

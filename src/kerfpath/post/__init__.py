@@ -13,6 +13,7 @@ from kerfpath.post.arcs import with_arcs as with_arcs
 from kerfpath.post.build import build_program as build_program
 from kerfpath.post.build import dry_run as dry_run
 from kerfpath.post.build import laser_start as laser_start
+from kerfpath.post.build import waits_at_start as waits_at_start
 from kerfpath.post.checks import preflight as preflight
 from kerfpath.post.comparison import Difference as Difference
 from kerfpath.post.comparison import deviations as deviations
@@ -53,6 +54,7 @@ from kerfpath.post.places import issue_lines as issue_lines
 from kerfpath.post.places import issues_before_planning as issues_before_planning
 from kerfpath.post.places import timed_lines as timed_lines
 from kerfpath.post.power import PowerBySpeed as PowerBySpeed
+from kerfpath.post.power import pierce_stages as pierce_stages
 from kerfpath.post.power import power_curve as power_curve
 from kerfpath.post.program import PARTNERS as PARTNERS
 from kerfpath.post.program import Await as Await

@@ -395,8 +395,7 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     yield from way
     yield from options.handshakes
     yield _straight(options, T[0], q[0], starts)
-    if wait > 0:
-        yield Wait(time=wait)
+    yield from (Wait(time=time) for time in waits_at_start(options, wait))
     yield from _cut(plan, T, q, options)
     T_out = T[-1].copy()
     T_out[:3, 3] -= options.retract * T_out[:3, 2]
@@ -418,6 +417,16 @@ def laser_start(options: ProgramOptions) -> tuple[Switch, float]:
     gas: tuple[Signal, ...] = () if options.gas_lead is None else ("gas",)
     laser = Switch(signal="laser", on=True, needs=(*gas, *on))
     return laser, options.pierce_time + options.lead_time
+
+
+def waits_at_start(options: ProgramOptions, wait: float) -> list[float]:
+    """Return the waits (s) at a start that last `wait` (s) together: one for each pierce stage.
+
+    What is longer than the pierce comes before its first stage.
+    """
+    waits = [time for _, time in options.pierce] or [0.0]
+    waits[0] += wait - sum(waits)
+    return [time for time in waits if time > 0]
 
 
 def _laser(options: ProgramOptions, *, on: bool) -> Switch:

@@ -7,9 +7,17 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
+from kerfpath.errors import InputError
 from kerfpath.post.arcs import Zone
 from kerfpath.post.languages import Language, LanguageSettings, Rules, language, plain
-from kerfpath.post.power import PowerBySpeed, PowerCurve, PowerFollows, power_curve
+from kerfpath.post.power import (
+    PierceStages,
+    PowerBySpeed,
+    PowerCurve,
+    PowerFollows,
+    pierce_stages,
+    power_curve,
+)
 from kerfpath.post.program import Handshake
 from kerfpath.setting import check, documented, setting
 
@@ -34,6 +42,7 @@ class ProgramKeywords(TypedDict, total=False):
     power_by_speed: PowerCurve | None
     power_step: float
     power_follows: PowerFollows
+    pierce_stages: PierceStages | None
     pierce_power: float | None
 
 
@@ -182,6 +191,14 @@ class ProgramOptions:
         what="steps or controller",
         example='"steps"',
     )
+    pierce_stages: PierceStages | None = setting(
+        None,
+        "stages of the pierce, one after the other: pairs of a share of the full power and a time, "
+        "s; they take the place of `pierce_time` and `pierce_power`, and need `power_by_speed`",
+        takes=list[list[float]],
+        what="pairs [share of the full power, time in s]",
+        example="[[0.4, 0.2], [0.8, 0.2]]",
+    )
     pierce_power: float | None = setting(
         None,
         "share of the full power while the beam pierces; none: that of the full speed",
@@ -209,10 +226,33 @@ class ProgramOptions:
         check(self)
         if self.power_by_speed is not None:
             object.__setattr__(self, "power_by_speed", power_curve(self.power_by_speed))
+        if self.pierce_stages is not None:
+            self._take_stages(pierce_stages(self.pierce_stages))
         if self.zone != "auto":
             object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
         object.__setattr__(self, "handshakes", tuple(self.handshakes))
         object.__setattr__(self, "remarks", tuple(map(plain, self.remarks)))
+
+    def _take_stages(self, stages: PierceStages) -> None:
+        """Take the time of the pierce from its stages."""
+        took = round(sum(time for _, time in stages), 9)
+        if self.power_by_speed is None:
+            raise InputError("pierce_stages: expected power_by_speed with it, got none; add it")
+        if self.pierce_power is not None or self.pierce_time not in (0.0, took):
+            raise InputError(
+                "pierce_stages: expected no other time or power of the pierce with it, got both; "
+                "leave pierce_time and pierce_power out"
+            )
+        object.__setattr__(self, "pierce_stages", stages)
+        object.__setattr__(self, "pierce_time", took)
+
+    @property
+    def pierce(self) -> PierceStages:
+        """The stages of the pierce; without a power that is set, one of any share."""
+        if self.pierce_stages is not None:
+            return self.pierce_stages
+        share = 1.0 if self.power is None else self.power.piercing
+        return ((share, self.pierce_time),) if self.pierce_time > 0 else ()
 
     @property
     def robot_language(self) -> Language:

@@ -13,7 +13,7 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.names import identifier, identifiers
 from kerfpath.post.arcs import Order, controller_frames, euler, timetable
-from kerfpath.post.build import laser_start
+from kerfpath.post.build import laser_start, waits_at_start
 from kerfpath.post.checks import foresee
 from kerfpath.post.languages import Formatter, number, plain
 from kerfpath.post.languages import language as find_language
@@ -319,7 +319,7 @@ def issues_before_planning(
                 duration=1.0,
                 switches=tuple(on),
             ),
-            *([Wait(time=wait)] if wait else []),
+            *(Wait(time=time) for time in waits_at_start(options, wait)),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=radius),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, switches=tuple(off)),
         )

@@ -18,6 +18,10 @@ from kerfpath.errors import InputError
 
 PowerCurve = tuple[tuple[float, float], ...]
 """Pairs of a share of the programmed speed and a share of the full power, by rising speed."""
+PierceStages = tuple[tuple[float, float], ...]
+"""Pairs of a share of the full power and a time, s: the stages of a pierce in their order."""
+MOST_STAGES = 20
+"""Most stages of a pierce."""
 PowerFollows = Literal["steps", "controller"]
 """Whether the program sets the power in steps, or the controller by the speed that it measures."""
 MARGIN = 0.25
@@ -48,6 +52,33 @@ def power_curve(pairs: Sequence[Sequence[float]]) -> PowerCurve:
     if found[-1][1] == 0:
         raise InputError(f"{expected} with a power above 0 at speed 1, got 0")
     return found
+
+
+def pierce_stages(pairs: Sequence[Sequence[float]]) -> PierceStages:
+    """Return the stages of a pierce as given by pairs.
+
+    Raises
+    ------
+    InputError
+        There are none or too many, a power is not a share above 0, or a time is not above 0.
+    """
+    expected = "pierce_stages: expected pairs [share of the full power, time in s]"
+    try:
+        found = tuple((float(share), float(time)) for share, time in pairs)
+    except (TypeError, ValueError):
+        raise InputError(f"{expected}, got {pairs!r}") from None
+    if not 1 <= len(found) <= MOST_STAGES:
+        raise InputError(f"{expected}, 1 to {MOST_STAGES} of them, got {len(found)}")
+    for share, time in found:
+        if not 0 < share <= 1:
+            raise InputError(f"{expected} with powers above 0, at most 1, got {share:g}")
+        if not 0 < time <= LONGEST_STAGE:
+            raise InputError(f"{expected}, above 0 and at most {LONGEST_STAGE:g} s, got {time:g} s")
+    return found
+
+
+LONGEST_STAGE = 60.0
+"""Longest stage of a pierce, s."""
 
 
 @dataclass(frozen=True, slots=True)

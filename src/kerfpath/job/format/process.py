@@ -117,6 +117,8 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
         raise all_of(faults)
     rows = list(chosen.values())
     once: dict[str, Sequence[Any]] = {"pierce_time_s": [row.pierce_time for row in rows]}
+    if _names(source, "power_output") and _takes_stages(source["program"], rows):
+        once = {"pierce_stages": [row.pierce_stages for row in rows]}
     if _names(source, "gas_output"):
         once["gas_lead_s"] = [row.gas_lead_s for row in rows]
     if _names(source, "power_output"):
@@ -148,6 +150,16 @@ def _filled(contour: Mapping[str, Any], row: RowTable) -> dict[str, Any]:
     if row.micro_joint_mm and isinstance(joints, dict):
         table["micro_joints"] = {"width_mm": row.micro_joint_mm, **joints}
     return table
+
+
+def _takes_stages(program: Mapping[str, Any], rows: Sequence[RowTable]) -> bool:
+    """Return whether the program of a job sets the power in the stages of the pierce of its rows.
+
+    It does if its power follows the speed, all powers are known, and the job says nothing else.
+    """
+    follows = "power_by_speed" in program or all(row.power_by_speed is not None for row in rows)
+    said = {"pierce_time_s", "pierce_power", "pierce_stages"} & set(program)
+    return follows and not said and all(row.pierce_stages is not None for row in rows)
 
 
 def _names(source: Mapping[str, Any], output: str) -> bool:
@@ -236,7 +248,9 @@ def by_hand(
     if row.micro_joint_mm and not joined:
         yield "micro_joint_mm", row.micro_joint_mm, f"micro joints {row.micro_joint_mm:g} mm"
     for number, stage in enumerate(row.pierce, 1):
-        yield f"pierce {number}", stage.time_s, f"pierce {number}: {stage_words(stage)}"
+        words = stage_words(stage, by_program="pierce_stages" in source.get("program", {}))
+        if words:
+            yield f"pierce {number}", stage.time_s, f"pierce {number}: {words}"
 
 
 def row_words(row: RowTable) -> str:
@@ -247,9 +261,10 @@ def row_words(row: RowTable) -> str:
     return ", ".join([*said, *(f"pierce {stage_words(stage)}" for stage in row.pierce)])
 
 
-def stage_words(stage: StageTable) -> str:
-    """Return the values of a stage of the pierce in words."""
-    given = {key: getattr(stage, key) for key in STAGE}
+def stage_words(stage: StageTable, *, by_program: bool = False) -> str:
+    """Return the values of a stage of the pierce in words; without those that a program sets."""
+    left_out = ("time_s", "power_w") if by_program else ()
+    given = {key: getattr(stage, key) for key in STAGE if key not in left_out}
     return " ".join(STAGE[key].format(each) for key, each in given.items() if each is not None)
 
 
@@ -326,7 +341,9 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
             inner = (own["micro_joints"], table["micro_joints"])
             found.append(_origin(name, "width_mm", *inner, row.place, None, under="micro_joints"))
     place = ", ".join(row.place for row in process.row)
-    for name, keys in (("program", ("pierce_time_s", "gas_lead_s")), ("cell", ("stand_off_mm",))):
+    power = [key for key in ("power_by_speed", "pierce_stages") if key in source.get("program", {})]
+    program_keys = ("pierce_time_s", "gas_lead_s", *power)
+    for name, keys in (("program", program_keys), ("cell", ("stand_off_mm",))):
         if name == "cell" and name not in source:
             continue
         for key in keys:

@@ -235,6 +235,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         "refine with parts": job.options.refine_parts > 1,
         "handshakes": bool(job.program.handshakes),
         "compensate": job.compensation is not None,
+        "power_by_speed": job.program.power is not None,
         "acceleration_table from a file": table not in (None, "library"),
         "acceleration_table beside other accelerations": table is not None
         and {"acceleration_deg_s2", "acceleration_ratio"} & {*job.source["robot"]},

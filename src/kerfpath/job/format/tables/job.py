@@ -27,7 +27,7 @@ from kerfpath.job.format.tables.part import (
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
-from kerfpath.job.format.tables.process import ProcessTable, curve_pairs
+from kerfpath.job.format.tables.process import ProcessTable, curve_pairs, stage_pairs
 from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
@@ -251,6 +251,23 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
     @classmethod
     def _is_a_curve(cls, pairs: list[list[float]] | None) -> list[list[float]] | None:
         return None if pairs is None else curve_pairs(pairs)
+
+    @field_validator("pierce_stages")
+    @classmethod
+    def _are_stages(cls, pairs: list[list[float]] | None) -> list[list[float]] | None:
+        return None if pairs is None else stage_pairs(pairs)
+
+    @model_validator(mode="after")
+    def _stages_stand_alone(self) -> ProgramTable:
+        if self.pierce_stages is None:
+            return self
+        given = {"pierce_time_s", "pierce_power"} & self.model_fields_set
+        for name in sorted(given):
+            raise fault(f"pierce_stages without {name}", "both", "remove one", (name,))
+        if self.power_by_speed is None:
+            said = "power_by_speed with pierce_stages"
+            raise fault(said, "none", "add power_by_speed", ("pierce_stages",))
+        return self
 
     @field_validator("language")
     @classmethod

@@ -18,7 +18,7 @@ from kerfpath.job.format.values import (
     fault_in_words,
     key,
 )
-from kerfpath.post import power_curve
+from kerfpath.post import pierce_stages, power_curve
 
 NORMAL = "normal"
 """The technique of a row, or of a job, that names none."""
@@ -62,6 +62,20 @@ def curve_pairs(pairs: Sequence[Sequence[float]]) -> list[list[float]]:
         return [list(pair) for pair in power_curve(pairs)]
     except InputError as error:
         raise fault_in_words(f"{error}".removeprefix("power_by_speed: ")) from None
+
+
+def stage_pairs(pairs: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Return the stages of a pierce.
+
+    Raises
+    ------
+    PydanticCustomError
+        They are none.
+    """
+    try:
+        return [list(pair) for pair in pierce_stages(pairs)]
+    except InputError as error:
+        raise fault_in_words(f"{error}".removeprefix("pierce_stages: ")) from None
 
 
 class StageTable(Table):
@@ -127,6 +141,14 @@ class RowTable(CutTable):
         """What the row is chosen by."""
         words = self.gas or "", self.quality or "", self.technique
         return (self.material, self.thickness_mm, *words)
+
+    @property
+    def pierce_stages(self) -> list[list[float]] | None:
+        """The stages as shares of `power_w` and times, s; None if powers are not known."""
+        full, powers = self.power_w, [stage.power_w for stage in self.pierce]
+        if full is None or not powers or None in powers:
+            return None
+        return [[round((s.power_w or 0.0) / full, 6), s.time_s] for s in self.pierce]
 
     @property
     def pierce_time(self) -> float | None:
