@@ -8,9 +8,10 @@ from kerfpath.planner import node_interval
 
 pytestmark = pytest.mark.usefixtures("explored")
 
-SEEDS = [0, 29]
+SEEDS = [0, 29, 192, 203]
 """Tasks whose first paths, on coarse samples of gamma, lie in another valley than the best motion:
-in another posture, and half a turn away; they cost 0.6 and 2.9 % more."""
+in another posture, half a turn away, and in postures that two joints at their limits leave less
+than 4 degrees of gamma; they cost 0.6, 2.9, 10.4 and 2.6 % more."""
 
 
 def test_a_seed_decides_all_of_a_task():

@@ -98,6 +98,32 @@ def test_every_sample_of_the_grid_that_has_a_pose_is_there(robot, frames, tool, 
         assert (k, p, round(float(wrap(gamma[m])), 9)) in here
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_branch_between_two_samples_of_the_grid_is_there(seed, robot, frames, tool, step):
+    """The range of one joint ends it on one side, that of another joint on the other."""
+    rng = np.random.default_rng(seed)
+    spacing = 2 * np.pi / INTERVALS
+    while True:
+        width = rng.uniform(0.1, 0.5) * spacing
+        low = rng.integers(INTERVALS) * spacing - np.pi + rng.uniform(0.1, 0.4) * spacing
+        ends = poses(np.repeat(frames[:1], 2, axis=0), np.array([low, low + width]), tool)
+        q, reach = robot.arm.inverse_all(ends)
+        posture = int(rng.integers(robot.postures))
+        one, other = q[:, posture]
+        if not reach[:, posture].all() or np.abs(q[:, posture]).max() > 3.0:
+            continue
+        a, b = rng.permutation(6)[:2]
+        if min(abs(other[a] - one[a]), abs(other[b] - one[b])) > 0.02 * width:
+            break
+    lower, upper = np.full(6, -np.pi), np.full(6, np.pi)
+    for joint, end, inward in ((a, one, other), (b, other, one)):  # each keeps its side of an end
+        (lower if end[joint] < inward[joint] else upper)[joint] = end[joint]
+    narrow = robot.with_limits(lower=lower, upper=upper, couplings=())
+    found = sample_branches(narrow, frames[:1], tool, step, [posture])
+    away = np.mod(found.gamma - low, 2 * np.pi)
+    assert ((away > 0) & (away < width)).any()
+
+
 def test_joints_between_neighbours_are_nearly_straight(robot, frames, tool, step, branches):
     one, other = branches.one, branches.other
     apart = one != other

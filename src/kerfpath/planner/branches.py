@@ -25,6 +25,10 @@ SAG, TURN = 0.1, 0.15
 that (5) allows, or turns by more, rad."""
 HALVINGS, TO_EDGES = 12, 7
 """Most halvings of an interval, to 0.001 degrees, and of one in which a branch ends, to 0.03."""
+HUMP, NEAR_REACH = 0.04, 0.15
+"""rad: an interval without a branch at its ends is halved if at one of them each joint is this near
+its range: inside the interval it may be in the range, for a way that falls with the square of the
+width, or where the arm is out of reach at the other end."""
 WIDEST = 0.6
 """rad: neighbouring samples are joined if no joint moves further between them."""
 EDGE = 1e-9
@@ -79,7 +83,8 @@ def sample_branches(
     here = intervals.at_low
     parts = [(node[here], posture[here], low[here], intervals.q_low[here])]
     for halved in range(HALVINGS):
-        intervals = intervals.of(intervals.at_low | intervals.at_high)
+        ends = intervals.at_low | intervals.at_high
+        intervals = intervals.of(ends | arm.may_pass(intervals, HUMP / 4**halved))
         middle = (intervals.low + intervals.high) / 2
         at, admitted = arm.solve(intervals.node, middle, intervals.posture)
         split = arm.coarse(intervals, at, admitted, step)
@@ -120,7 +125,8 @@ class _Arm:
     def on_grid(self, gamma: Array) -> tuple[Array, Bools]:
         """Return joints (K, m, P, n) at every gamma (m,), and which are admitted, (K, m, P)."""
         q, reach = self._robot.arm.inverse_nodes(self._frames, gamma, self._tool)
-        return self._within(q, reach & self._wanted)
+        reach = reach & self._wanted
+        return self._within(np.where(reach[..., None], q, np.nan), reach)
 
     def solve(self, node: Ints, gamma: Array, posture: Ints) -> tuple[Array, Bools]:
         """Return joints (B, n) of nodes at gamma in postures (B,), and which are admitted, (B,)."""
@@ -141,6 +147,26 @@ class _Arm:
                 value = q @ row
                 admitted &= (value >= least - EDGE) & (value <= most + EDGE)
         return q, np.asarray(admitted)
+
+    def may_pass(self, intervals: _Intervals, hump: float) -> Bools:
+        """Return in which intervals (B,) there may be a branch that ends inside on both sides.
+
+        The range of one joint may end the branch on one side, that of another joint on the other.
+        """
+        low, high = self._outside(intervals.q_low), self._outside(intervals.q_high)
+        nearer = np.fmin(low, high).max(axis=1, initial=0.0)
+        most = np.where(np.isfinite(low + high).all(axis=1), hump, NEAR_REACH)
+        return np.asarray(nearer <= most)
+
+    def _outside(self, q: Array) -> Array:
+        """Return how far joints (B, n) and couplings are out of their ranges; NaN if no joints."""
+        limits = self._limits
+        beyond = np.minimum(q - limits.upper, limits.lower + 2 * np.pi - q)
+        beyond = np.where(limits.endless & np.isfinite(q), 0.0, np.maximum(beyond, 0.0))
+        value = q @ limits.rows.T
+        apart = np.maximum(limits.row_lower - value, value - limits.row_upper)
+        apart[:, (self.endless & (limits.rows != 0)).any(axis=1)] = 0.0
+        return np.hstack([beyond, np.maximum(apart, 0.0)])
 
     def coarse(self, intervals: _Intervals, at: Array, admitted: Bools, step: Array) -> Bools:
         """Return which intervals (B,) are to be halved, from the joints in their middle (B, n)."""
@@ -163,7 +189,7 @@ def _joined(
     new = np.ones(len(node), np.bool_)
     new[1:] = (node[1:] != node[:-1]) | (posture[1:] != posture[:-1])
     first = np.flatnonzero(new)
-    last = np.append(first[1:], len(node)) - 1
+    last = np.append(first[1:], len(node))[: len(first)] - 1
     after = each + 1
     after[last] = first
     near = np.mod(gamma[after] - gamma, 2 * np.pi) < (2 * np.pi + EDGE) / INTERVALS + EDGE
