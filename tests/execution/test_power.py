@@ -12,12 +12,14 @@ from tests.post.cases import CASES
 from kerfpath import InputError
 from kerfpath.execution import power_along, with_power
 from kerfpath.post import (
+    Await,
     JointMove,
     PowerBySpeed,
     ProgramOptions,
     ReadMove,
     ReadPower,
     ReadWait,
+    Request,
     SetPower,
     build_program,
     dry_run,
@@ -145,6 +147,57 @@ def test_the_stages_of_a_pierce_follow_each_other_at_the_start(name):
 def test_stages_that_are_none_are_refused(more, words):
     with pytest.raises(InputError, match=words):
         ProgramOptions(**{"power_by_speed": CURVE, **more})
+
+
+PARTNERS = {
+    "rapid": {"ready_input": "diReady", "shutter_output": "doShutter"},
+    **{name: {"ready_input": 6, "shutter_output": 7} for name in ("krl", "fanuc", "urscript")},
+    "linuxcnc": {"ready_input": 6, "shutter_output": 7},
+    "inform": {"ready_input": 6, "shutter_output": 7},
+}
+
+
+@pytest.mark.parametrize("name", PARTNERS)
+def test_no_path_without_an_answer_has_power(name):
+    """Two contours that ask partners: with no answer everything is off, the power, too."""
+    case, by = CASES[name], name == "inform"
+    power = BY_CONTROLLER[name][0] if by else POWER[name]
+    options = ProgramOptions(
+        language=name,
+        settings=case.language.settings(**{**case.options, **power, **PARTNERS[name]}),
+        power_by_speed=((0.0, 0.0), (1.0, 1.0)), pierce_stages=STAGES, lead_time=0.0,
+        power_follows="controller" if by else "steps",
+        handshakes=(Request(partner="shutter", on=True), Await(partner="ready", timeout=5.0)),
+    )  # fmt: skip
+    plan = dipping(case)
+    other = replace(plan, contour=replace(plan.contour, name="skin/other"))
+    program = with_power(build_program([plan, other], options), options)
+    _, read = case.reads_back(program, options.settings)
+    assert unsafe_paths(read) == []
+    on = replace(
+        read,
+        sections=tuple(
+            replace(s, flow=tuple(step for step in s.flow or s.steps if not is_off(step)), steps=())
+            for s in read.sections
+        ),
+    )
+    assert any("the power" in str(issue) for issue in unsafe_paths(on)), "it stays on in the air"
+
+
+def is_off(step):
+    return isinstance(step, ReadPower) and max(step.share, step.per_speed) == 0
+
+
+@pytest.mark.parametrize("name", [name for name in POWER if name != "linuxcnc"])
+def test_the_power_follows_along_arcs(name):
+    options = options_of(name, arc_tolerance=2e-5)
+    case = CASES[name]
+    plan = dipping(case)
+    program = with_power(build_program([plan], options), options)
+    along = power_along(program, program.sections[0], options)
+    assert along.difference <= options.power.tolerance + 1e-12
+    assert along.s[-1] == pytest.approx(plan.contour.length, rel=1e-6)
+    case.reads_back(program, options.settings)
 
 
 @pytest.mark.parametrize("name", WITHOUT)

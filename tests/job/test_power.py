@@ -1,13 +1,16 @@
 """The power by the speed: a job in each language, its audit, and what harmful edits come to."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from benchmarks.program_edits import ACCELERATION, ARM, ARMS, JOB, Subject, _draw
 
+from kerfpath.cli.plan_output import _power_entry
 from kerfpath.execution import power_along, with_power
-from kerfpath.job import Audit, run_job
+from kerfpath.job import Audit, power_of, read_job, run_job
+from kerfpath.job.output.writing import report_text
 from kerfpath.post import ReadMove, ReadPower, build_program, languages, unsafe_paths
 
 POWER = {
@@ -70,6 +73,27 @@ def subjects(tmp_path_factory):
 @pytest.fixture(scope="module")
 def by_controller(tmp_path_factory):
     return made_subjects(tmp_path_factory.mktemp("controller"), BY_CONTROLLER, LINE)
+
+
+def test_report_and_json_have_the_power_along_each_cut(tmp_path):
+    """The power in the report, and the figures of a cut, are those of the program."""
+    _draw(tmp_path / "points.csv")
+    path = tmp_path / "rapid.toml"
+    path.write_text(job_text("rapid"))
+    outcome = run_job(read_job(path))
+    page = report_text(outcome, ())
+    assert page.count("<h4>Power</h4>") == len(outcome.cuts) == 2
+    assert "Off the power by the speed" in page
+    for cut in outcome.cuts:
+        entry = _power_entry(outcome.job, cut)
+        along = power_of(outcome.job, cut)
+        assert entry["power_share"] == along.set.tolist()
+        assert len(entry["s_m"]) == len(entry["speed_share"]) + 1
+        assert entry["changes"] == along.switches >= 1
+        assert entry["largest_difference"] <= 0.075
+        assert entry["s_m"][-1] == pytest.approx(cut.plan.contour.length, rel=1e-6)
+    without = replace(outcome.job, program=replace(outcome.job.program, power_by_speed=None))
+    assert _power_entry(without, outcome.cuts[0]) is None
 
 
 @pytest.fixture(scope="module")
