@@ -87,6 +87,11 @@ def test_a_dip_of_the_speed_lowers_the_power_within_its_steps(name, step):
     assert np.ptp(middle) == 0, "an even speed switches nothing"
     assert middle[0] == pytest.approx(np.interp(0.8, *np.array(CURVE).T), abs=0.75 * step)
     assert 2 <= along.switches <= 2 + 2 * round(0.7 / step)
+    assert (np.diff(along.fine_s) >= 0).all()
+    assert along.fine_s[[0, -1]] == pytest.approx(along.s[[0, -1]], abs=1e-12)
+    inner = (along.fine_s > 0.4 * along.s[-1]) & (along.fine_s < 0.6 * along.s[-1])
+    assert along.fine_speed[inner] == pytest.approx(0.8, abs=0.05 if name == "linuxcnc" else 1e-3)
+    assert along.mean_difference <= along.difference + 0.02
     case = CASES[name]
     _, read = case.reads_back(program, options.settings)
     assert unsafe_paths(read) == []

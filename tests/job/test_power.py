@@ -91,6 +91,11 @@ def test_report_and_json_have_the_power_along_each_cut(tmp_path):
         assert len(entry["s_m"]) == len(entry["speed_share"]) + 1
         assert entry["changes"] == along.switches >= 1
         assert entry["largest_difference"] <= 0.075
+        assert 0 < entry["mean_difference"] < 0.1
+        s, speed = entry["fine_s_m"], entry["fine_speed_share"]
+        assert len(s) == len(speed)
+        assert (np.diff(s) >= 0).all()
+        assert max(speed) == pytest.approx(1.0, abs=0.01)
         assert entry["s_m"][-1] == pytest.approx(cut.plan.contour.length, rel=1e-6)
     without = replace(outcome.job, program=replace(outcome.job.program, power_by_speed=None))
     assert _power_entry(without, outcome.cuts[0]) is None

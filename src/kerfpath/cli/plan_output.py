@@ -286,6 +286,9 @@ def _power_entry(job: Job, cut: CutResult) -> dict[str, object] | None:
         "power_share": along.set.tolist(),
         "changes": along.switches,
         "largest_difference": along.difference,
+        "mean_difference": along.mean_difference,
+        "fine_s_m": along.fine_s.tolist(),
+        "fine_speed_share": along.fine_speed.tolist(),
     }
 
 

@@ -29,6 +29,31 @@ SHORTEST = 1e-9
 """Least time (s) of a move."""
 
 
+EVERY = 2e-3
+"""Time (s) between two samples of LinuxCNC's motion."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExecutedSpeeds:
+    """The speed of the tip in m moves, as they are executed.
+
+    Parameters
+    ----------
+    mean : (m,) m/s
+        In each move.
+    s : (k,) m
+        Length of the way at samples, from 0 at the start.
+    speed : (k,) m/s
+        The speed there.
+    """
+
+    mean: Array
+    s: Array
+    speed: Array
+
+    __repr__ = short_repr
+
+
 def executed_speeds(
     moves: Sequence[LinearMove],
     robot: Robot,
@@ -36,8 +61,8 @@ def executed_speeds(
     *,
     T_base_part: Array,
     T_flange_tip: Array,
-) -> Array:
-    """Return the mean speed (m,) m/s of the tip in each of m moves, as they are executed.
+) -> ExecutedSpeeds:
+    """Return the speed of the tip in each of m moves, as they are executed.
 
     From stop to stop, the robot runs at the programmed speeds where the limits of the joints allow
     them, from rest and to rest, see `timing_of`; LinuxCNC as the model of its planner says. The lag
@@ -59,14 +84,22 @@ def executed_speeds(
     """
     spoken, settings = options.robot_language, options.language_settings
     planned = np.array([move.duration for move in moves[1:]])
-    length = np.array([move.speed for move in moves[1:]]) * planned
-    took = planned.copy()
+    programmed = np.array([move.speed for move in moves[1:]])
+    ways, took = programmed * planned, planned.copy()
+    at = np.append(0.0, np.cumsum(ways))
+    samples: list[tuple[Array, Array]] = []
     stops = [0, *(k for k, move in enumerate(moves) if k > 0 and move.zone == 0)]
     stops += [] if stops[-1] == len(moves) - 1 else [len(moves) - 1]
     for first, last in pairwise(stops):
-        if spoken.durations is not None:
+        begin, end = at[first], at[last]
+        if spoken.motion is not None:
             q = np.array([move.q for move in moves[first : last + 1]])
-            took[first:last] = spoken.durations(robot, q, planned[first:last], settings)
+            made = spoken.motion(robot, q, planned[first:last], settings, EVERY)
+            took[first:last] = made.took
+            tip = (robot.forward(made.q) @ T_flange_tip)[:, :3, 3]
+            steps = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+            gone = np.append(0.0, np.cumsum(steps))
+            speed = np.append(steps, 0.0) / EVERY
         elif spoken.zones and last - first > 1:
             run = run_along(
                 moves[first : last + 1],
@@ -76,9 +109,17 @@ def executed_speeds(
                 controller=options.rules.controller,
                 bounded=False,
             )
-            timing = timing_of(run)
-            took[first:last] = np.diff(np.interp(run.tool_motion.time, timing.time, timing.clock))
-    return np.asarray(length / np.maximum(took, SHORTEST))
+            timing, ends = timing_of(run), run.tool_motion.time
+            took[first:last] = np.diff(np.interp(ends, timing.time, timing.clock))
+            k = np.clip(np.searchsorted(ends, timing.time, side="right") - 1, 0, last - first - 1)
+            gone, speed = timing.length, timing.share * (ways[first:last] / np.diff(ends))[k]
+        else:
+            gone = np.repeat(at[first : last + 1], 2)[1:-1] - begin
+            speed = np.repeat(programmed[first:last], 2)
+        samples.append((begin + gone / max(float(gone[-1]), SHORTEST) * (end - begin), speed))
+    s, speed = (np.concatenate(each) for each in zip(*samples, strict=True))
+    mean = ways / np.maximum(took, SHORTEST)
+    return ExecutedSpeeds(mean=freeze(mean), s=freeze(s), speed=freeze(speed))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,6 +138,8 @@ class PowerAlong:
         Share of the full power that the program sets.
     lit : (m,) bool
         Whether the laser is on; it is off along micro joints.
+    fine_s, fine_speed, fine_asked : (k,) m
+        Length of the way at samples, and speed and power by it there, as shares.
     in_steps : bool
         Whether the program sets the power in steps, or the controller by the speed.
     """
@@ -106,6 +149,9 @@ class PowerAlong:
     asked: Array
     set: Array
     lit: Bools
+    fine_s: Array
+    fine_speed: Array
+    fine_asked: Array
     in_steps: bool = True
 
     __repr__ = short_repr
@@ -119,8 +165,18 @@ class PowerAlong:
 
     @property
     def difference(self) -> float:
-        """Largest difference of the power from what is asked, where the laser is on."""
+        """Largest difference of the power from what is asked in a move with the laser on."""
         return float(np.abs(self.set - self.asked)[self.lit].max(initial=0.0))
+
+    @property
+    def mean_difference(self) -> float:
+        """Mean difference from the power by the speed at every place, along the lit way."""
+        steps, middle = np.diff(self.fine_s), (self.fine_s[1:] + self.fine_s[:-1]) / 2
+        asked = (self.fine_asked[1:] + self.fine_asked[:-1]) / 2
+        k = np.clip(np.searchsorted(self.s, middle, side="right") - 1, 0, len(self.set) - 1)
+        off = np.abs(self.set[k] - asked) if self.in_steps else np.zeros(len(k))
+        weight = steps * self.lit[k]
+        return float((off * weight).sum() / max(float(weight.sum()), SHORTEST))
 
 
 def power_along(program: Program, section: Section, options: ProgramOptions) -> PowerAlong | None:
@@ -142,7 +198,7 @@ def power_along(program: Program, section: Section, options: ProgramOptions) -> 
         T_base_part=program.T_base_part,
         T_flange_tip=program.T_flange_tip,
     )
-    share = shares_of(moves, speed)
+    share, fine = shares_of(moves, speed.mean), shares_of(moves, speed.speed)
     ways = [move.speed * move.duration for move in moves[1:]]
     lit = lit_of(moves)
     in_steps = law.follows == "steps"
@@ -153,6 +209,9 @@ def power_along(program: Program, section: Section, options: ProgramOptions) -> 
         asked=freeze(law.at(share)),
         set=freeze(given),
         lit=lit,
+        fine_s=speed.s,
+        fine_speed=freeze(fine),
+        fine_asked=freeze(law.at(fine)),
         in_steps=in_steps,
     )
 

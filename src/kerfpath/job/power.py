@@ -79,8 +79,8 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
     )
     said, slope = _in_moves(group)
     full = max(move.speed for move in moves[1:])
-    cut = said[1:-1] + slope[1:-1] * speed
-    off = np.where(lit_of(path[:-1]), np.abs(cut - law.at(shares_of(moves, speed))), 0.0)
+    cut = said[1:-1] + slope[1:-1] * speed.mean
+    off = np.where(lit_of(path[:-1]), np.abs(cut - law.at(shares_of(moves, speed.mean))), 0.0)
     if law.follows == "steps":
         wrong = (np.abs(cut - law.nearest(cut)) > SAME_POWER) | (slope[1:-1] > 0)
     else:

@@ -672,6 +672,13 @@ BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueE
 """Exceptions that a module written for another version may raise when it is imported."""
 
 
+class MotionFromStop(NamedTuple):
+    """How long each of m moves takes, (m,) s, and the joints (k, n) rad every `step` s."""
+
+    took: Array
+    q: Array
+
+
 def _none_is_reserved(name: str) -> bool:
     return False
 
@@ -723,9 +730,9 @@ class Language:
         Whether its moves are straight lines and arcs whose corners the controller rounds.
     assumed : mapping of str to value
         Values of settings that are None; the preflight warns of assumed outputs.
-    durations : callable, optional
-        (robot, q (m+1, n) rad, planned (m,) s, settings) -> how long moves take from stop to stop,
-        (m,) s. None: as `kerfpath.execution` models it.
+    motion : callable, optional
+        (robot, q (m+1, n) rad, planned (m,) s, settings, step s) -> how moves run from stop to
+        stop. None: as `kerfpath.execution` models it.
     no_power : str
         Why programs cannot set the power along the path; empty if they can.
     follows_speed : bool
@@ -763,7 +770,7 @@ class Language:
     assumed: Mapping[str, Any] = field(default_factory=dict)
     no_power: str = ""
     follows_speed: bool = False
-    durations: Callable[[Robot, Array, Array, Any], Array] | None = None
+    motion: Callable[[Robot, Array, Array, Any, float], MotionFromStop] | None = None
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
     encodings: tuple[str, ...] = ("utf-8-sig",)
     byte_order_mark: bool = False

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from kerfpath.arrays import Array, short_repr
+from kerfpath.arrays import Array, short_repr, spread
 from kerfpath.report.style import ACCENT, CHOSEN, FAINT, axis, axis_title, base_layout, short
 
 HEIGHT = 240
+MOST_POINTS = 1500
+"""Number of points of a line; more are not seen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,39 +23,46 @@ class PowerPath:
     ----------
     s : (m+1,) m
         Length of the way up to each target.
-    speed, asked, set : (m,)
-        Executed speed in each move, the power by it, and the power that the program sets.
+    set : (m,)
+        The power that the program sets in each move.
+    fine_s : (k,) m
+        Length of the way at samples.
+    speed, asked : (k,)
+        Executed speed there, and the power by it.
     facts : sequence of (what, value)
         Rows in words.
     """
 
     s: Array
+    set: Array
+    fine_s: Array
     speed: Array
     asked: Array
-    set: Array
     facts: tuple[tuple[str, str], ...] = ()
 
     __repr__ = short_repr
 
 
 def power_along(path: PowerPath) -> go.Figure:
-    """Return the power and the speed along the way, per cent, as steps from target to target."""
+    """Return the power and the speed along the way, per cent; the power is set at targets."""
     figure = go.Figure(layout=base_layout(HEIGHT, hovermode="x unified"))
     figure.update_layout(
         margin={"l": 62, "r": 44, "t": 40, "b": 48},
         legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
     )
-    for name, values, colour, width in (
-        ("speed", path.speed, FAINT, 1.6),
-        ("power by the speed", path.asked, ACCENT, 1.6),
-        ("power", path.set, CHOSEN, 2.2),
+    some = spread(len(path.fine_s), MOST_POINTS)
+    steps = np.append(path.set, path.set[-1:])
+    for name, s, values, colour, shape in (
+        ("speed", path.fine_s[some], path.speed[some], FAINT, "linear"),
+        ("power by the speed", path.fine_s[some], path.asked[some], ACCENT, "linear"),
+        ("power", path.s, steps, CHOSEN, "hv"),
     ):
         figure.add_scatter(
-            x=short(path.s * 1e3),
-            y=short(100 * np.append(values, values[-1:])),
+            x=short(s * 1e3),
+            y=short(100 * values),
             mode="lines",
             name=name,
-            line={"color": colour, "width": width, "shape": "hv"},
+            line={"color": colour, "width": 1.8, "shape": shape},
             hovertemplate="%{y:.1f} %",
         )
     figure.update_layout(

@@ -262,9 +262,17 @@ def _power(job: Job, cut: CutResult) -> PowerPath | None:
     facts = (
         ("Power", f"{least:.0%} to {most:.0%} of the full power"),
         ("Changes", str(along.switches)),
-        ("Off the power by the speed", f"at most {along.difference:.1%}"),
+        ("Off the power by the mean speed of a move", f"at most {along.difference:.1%}"),
+        ("Off the power by the speed, mean along the way", f"{along.mean_difference:.1%}"),
     )
-    return PowerPath(s=along.s, speed=along.speed, asked=along.asked, set=along.set, facts=facts)
+    return PowerPath(
+        s=along.s,
+        set=along.set,
+        fine_s=along.fine_s,
+        speed=along.fine_speed,
+        asked=along.fine_asked,
+        facts=facts,
+    )
 
 
 def power_of(job: Job, cut: CutResult) -> PowerAlong | None:

@@ -5,7 +5,7 @@ from kerfpath.post.linuxcnc.checks import check, without_leads
 from kerfpath.post.linuxcnc.controller import LinuxcncSettings as LinuxcncSettings
 from kerfpath.post.linuxcnc.controller import inherited, rules
 from kerfpath.post.linuxcnc.motion import Stretch as Stretch
-from kerfpath.post.linuxcnc.motion import durations
+from kerfpath.post.linuxcnc.motion import run_moves
 from kerfpath.post.linuxcnc.motion import stretches_of as stretches_of
 from kerfpath.post.linuxcnc.reader import read
 from kerfpath.post.linuxcnc.recorder import Record as Record
@@ -29,7 +29,7 @@ LINUXCNC = Language(
     assumed={"laser_output": 0},
     externals=no_settings_needed,
     inherited=inherited,
-    durations=durations,
+    motion=run_moves,
     read=read,
 )
 """The language as registered."""

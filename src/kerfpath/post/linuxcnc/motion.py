@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from kerfpath.arrays import Array, freeze, short_repr
+from kerfpath.post.languages import MotionFromStop
 from kerfpath.post.linuxcnc.controller import LinuxcncSettings, cruise_time, goes_nowhere, ramp_of
 from kerfpath.post.read_program import ReadMove, ReadProgram, ReadWait
 from kerfpath.robots import Robot
@@ -114,17 +115,21 @@ def stretch_of(
     return stretch(moves, q, asked, robot, settings)
 
 
-def durations(robot: Robot, q: Array, planned: Array, settings: LinuxcncSettings) -> Array:
-    """Return how long moves take (m,) s through joints q (m+1, n) rad, from stop to stop.
+def run_moves(
+    robot: Robot, q: Array, planned: Array, settings: LinuxcncSettings, step: float
+) -> MotionFromStop:
+    """Return how moves run through joints q (m+1, n) rad, from stop to stop, every `step` s.
 
     A move ends where the next one begins. Those that go nowhere take their planned times (m,) s.
     """
-    took = planned.copy()
+    took, found = planned.copy(), q[[0, -1]]
     goes = np.array([not goes_nowhere(way) for way in np.diff(q, axis=0)])
     if goes.any():
         run = stretch((), q[np.append(True, goes)], planned[goes], robot, settings)
         took[goes] = np.diff(np.append(run.begin, run.time))
-    return took
+        # Up to the last sample before the end, at which joints are still looked up.
+        found = np.vstack([run.at(np.arange(0.0, run.time * (1 - 1e-9), step)), q[-1:]])
+    return MotionFromStop(took=took, q=found)
 
 
 def stretch(
