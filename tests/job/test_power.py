@@ -166,7 +166,7 @@ def lines_that_set(subject, name):
                     yield file, k, found
 
 
-SOME = 5
+SOME = 4
 """About as many edits of each kind are tried in each language; all were, once."""
 
 
@@ -241,7 +241,7 @@ WAITS = {
 
 @pytest.mark.parametrize("name", WAITS)
 def test_a_staged_pierce_passes_and_no_edit_of_a_stage_does(staged, name):
-    """Each stage has another time, two of them change places, one is left out."""
+    """Two stages change places, one is left out, one has another time."""
     subject = staged[name]
     assert subject.outcome(subject.files) == ("passed", "")
     (file, first), *_ = [
@@ -253,11 +253,11 @@ def test_a_staged_pierce_passes_and_no_edit_of_a_stage_does(staged, name):
     lines = subject.files[file].split("\n")
     waits = [k for k in range(first, first + 5) if re.search(WAITS[name], lines[k])]
     assert len(waits) == 3
-    found = [re.search(WAITS[name], lines[k]) for k in waits]
     swapped = list(lines)
     swapped[waits[0]], swapped[waits[1]] = lines[waits[1]], lines[waits[0]]
     texts = [swapped, [*lines[: waits[1] - 1], *lines[waits[1] + 1 :]]]
-    for k, match in zip(waits, found, strict=True):
+    for k in waits[2:]:
+        match = re.search(WAITS[name], lines[k])
         time = f"{float(match[1]) + 0.05:.{len(match[1].partition('.')[2])}f}".lstrip("0")
         other = f"{lines[k][: match.start(1)]}{time}{lines[k][match.end(1) :]}"
         texts.append([*lines[:k], other, *lines[k + 1 :]])
