@@ -62,6 +62,10 @@ CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
 the plan by this share, four times the share per coarser level, because a checker's own enclosures
 may give less; and the factor on the curvature. Otherwise only `SAME_COST`, for rounding."""
 NOT_KEPT = f'{OF_BOUND}of the objective "max" has no certificate to keep'
+LOWER, LOWER_NEW = 0.005, 0.1
+"""Shares of the plan's cost by which the potential of a stage may be below the best bound, or below
+that of a stage with new cells after it; the second with new cells. If it is lower, the stage is
+laid again with more of its steps."""
 UNFOLDED = 0.2
 """Share of the work within which cells must have been bounded on every turn of their joints, so
 that turns are distinguished: joints with a range of a turn or more count as endless before."""
@@ -310,6 +314,7 @@ class _Certification:
         self.stages: list[Stage] = []
         self.plan, self.checkable = plan, checkable
         self.by_fewer = 0.0  # the bound by fewer nodes; a stage that proves less lacks finer cells
+        self.potential = 0.0  # what it is expected to reach at the first layer
         self.proved = 0.0  # by the stages that are kept
         self.loose: tuple[int, StageResult] | None = None  # the best one left out, and its place
 
@@ -320,11 +325,13 @@ class _Certification:
         cells = self.maker.certain(cells, self.steps.weight, UNCERTAIN * self.cost)
         fresh = True  # new cells, which the certificate must contain
         while True:
-            result = solve_stage(cells, self.steps, care=CARE * self.cost)
-            coarse = result.bound < self.by_fewer
+            result = self._solved(cells, fresh)
+            alone = result.bound
+            coarse = alone < self.by_fewer
             if not self.checkable:
                 result = result.floored()
             gained, cells = self._take(result), result.cells
+            self.potential = min(alone, self.best) if fresh else self.best
             clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.grain))
             live = result.through <= self.cost * (1 + clearly)
             if not self.checkable:
@@ -369,6 +376,18 @@ class _Certification:
                 cells = self.maker.divided(lifted, which)
             else:
                 cells = self.maker.divided(cells.take(kept), which[kept])
+
+    def _solved(self, cells: CellSet, fresh: bool) -> StageResult:
+        """Return the bounds of a stage, without steps that only motions dearer than the plan take.
+
+        A checker decides by its own potential, and has all steps.
+        """
+        care = CARE * self.cost
+        if self.checkable or not self.count:
+            return solve_stage(cells, self.steps, care=care)
+        low = self.potential - (LOWER_NEW if fresh else LOWER) * self.cost
+        worth = self.cost * (1 + self.margin)
+        return solve_stage(cells, self.steps, care=care, worth=worth, low=low)
 
     @property
     def _patient(self) -> bool:

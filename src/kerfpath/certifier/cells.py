@@ -265,12 +265,13 @@ class CellMaker:
         column = np.tile(np.arange(columns), each * len(nodes))
         level = np.full(len(node), coarse, np.int8)
         cuts = np.zeros(len(node), np.int16)
+        wanted = np.isin(np.arange(self._robot.postures), self._postures)[None]
         sets = []
         for first in range(0, len(node), AT_ONCE):
             part = slice(first, first + AT_ONCE)
             at, reach = self._first_at[column[part]], self._first_reach[column[part]]
             keys = node[part], level[part], index[part], cuts[part], at, reach
-            sets.append(self.lifted(self._enclosed_all(*keys)[0]))
+            sets.append(self.lifted(self._enclosed_all(*keys, wanted)[0]))
         return CellSet.join(sets)
 
     @property
@@ -414,14 +415,17 @@ class CellMaker:
             parent, right, turned = parent[real], right[real], turned[real]
             node, level, index, cuts = node[real], level[real], index[real], cuts[real]
             at, reach = at[real], reach[real]
-        key = np.stack([node, level, index], axis=1)
         if M:
-            key = np.column_stack([key, at, reach])
+            key: Array | Ints = np.column_stack([node, level, index, at, reach])
+        else:  # one number: sorting rows takes longer
+            key = ((node.astype(np.int64) << 6) + level << 32) + index
         _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
         which = which.ravel()
+        wanted = np.zeros((len(first), self._robot.postures), np.bool_)
+        wanted[which, cells.posture[parent]] = True
         made, place = self._enclosed_all(
             node[first], level[first], index[first].astype(np.int32), cuts[first], at[first],
-            reach[first],
+            reach[first], wanted,
         )  # fmt: skip
         row = place[which, cells.posture[parent]]
         real = row >= 0
@@ -475,8 +479,12 @@ class CellMaker:
         cuts: NDArray[np.int16],
         at: Array,
         reach: Array,
+        wanted: Bools,
     ) -> tuple[CellSet, Ints]:
-        """Return the cells with a solution, and the row of each posture (B, P), -1 for none."""
+        """Return the cells with a solution in postures that are wanted, (B, P).
+
+        Also returned is the row of each posture (B, P), -1 for none.
+        """
         gamma, half = cell_bounds(level, index)
         arm, frames, places, M = self._robot.arm, self._frames, node.astype(np.int64), at.shape[1]
         if M:
@@ -487,8 +495,6 @@ class CellMaker:
         else:
             curves = arm.enclose(frames, places, gamma, half, self._tool)
             status = curves.status
-        wanted = np.zeros(status.shape[1], np.bool_)
-        wanted[self._postures] = True
         cell, posture = np.nonzero((status > 0) & wanted)
         of, h = (cell, posture), half[cell, None]
         if M:

@@ -23,7 +23,9 @@ SAMPLES, ROUNDS, NARROWER = 9, 7, 1 / 4
 each time."""
 WIDTH = 2 * np.pi / BASE
 """rad: how far from a known gamma the first samples reach."""
-MOST_NODES = 1000
+AT_ONCE = 200_000
+"""Steps from sample to sample bounded at a time."""
+MOST_NODES = 400
 """Most nodes at which gamma is sampled, apart from the layers."""
 CHEAPER = 1e-4
 """Share of the cost by which another motion must promise to cost less to be looked at."""
@@ -173,14 +175,18 @@ class FirstOrder:
         q, _, reached = self._maker.joints(np.repeat(nodes, S), gamma.ravel(), posture)
         q, reached = q.reshape(M, S, -1), reached.reshape(M, S)
         upto, before = np.where(reached[0], 0.0, np.inf), []
-        for k, span in enumerate(np.diff(nodes).tolist()):
-            dq = _short(q[k + 1] - q[k][:, None])
+        span, at_once = np.diff(nodes), max(1, AT_ONCE // (S * S))
+        for first in range(0, M - 1, at_once):
+            here = slice(first, min(first + at_once, M - 1))
+            there = slice(here.start + 1, here.stop + 1)
+            dq = _short(q[there, None] - q[here, :, None])
+            fast = np.abs(dq) > span[here, None, None, None] * self._steps.velocity
             cost = self._steps.distance(dq)
-            cost[(np.abs(dq) > span * self._steps.velocity).any(axis=-1)] = np.inf
-            cost += np.where(reached[k + 1], 0.0, np.inf)
-            cost += upto[:, None]
-            before.append(cost.argmin(axis=0))
-            upto = cost.min(axis=0)
+            cost[fast.any(axis=-1) | ~reached[there, None]] = np.inf
+            for each in cost:
+                each += upto[:, None]
+                before.append(each.argmin(axis=0))
+                upto = each.min(axis=0)
         if not np.isfinite(upto).any():
             return None
         path = [int(upto.argmin())]

@@ -16,7 +16,6 @@ from kerfpath.errors import Closed
 from kerfpath.kernels.cell_elimination import (
     blame_bends,
     count_rejections,
-    count_steps,
     keep_back,
     keep_on,
     list_steps,
@@ -220,14 +219,13 @@ class _Round:
         """Return the steps from the live cells of layer k; None if there are too many."""
         start = self._packed.start
         count = np.zeros(start[k + 1] - start[k], np.int64)
-        count_steps(self._packed, self._steps[k], self._lead_v, k, live, count)
-        begin = np.concatenate([[0], np.cumsum(count)])
-        self._number += int(begin[-1])
-        if self._number > current_effort().infeasibility_steps:
+        most = current_effort().infeasibility_steps - self._number
+        to = list_steps(self._packed, self._steps[k], self._lead_v, k, live, most, count)
+        self._number += len(to)
+        if len(to) > most:
             self.left = True
             return None
-        to = np.empty(begin[-1], np.int64)
-        list_steps(self._packed, self._steps[k], self._lead_v, k, live, begin, to)
+        begin = np.concatenate([[0], np.cumsum(count)])
         return _Layer(begin, to, np.ones(len(to), np.bool_))
 
     def _few(self, layer: _Layer, ahead: _Layer, k: int) -> bool:

@@ -25,7 +25,7 @@ from kerfpath.kernels.bends import cross_back, cross_on
 from kerfpath.kernels.cell_elimination import Bend
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
-from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
+from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangents
 
 # -----------------------------------------------------------------------------
@@ -220,6 +220,8 @@ class StageResult:
     multipliers : (M, n), optional
     begin, to : (C + 1,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
+    count : int
+        Number of all steps, with those that are left out.
     tests : int
         Number of pairs of steps tested.
     """
@@ -231,6 +233,7 @@ class StageResult:
     multipliers: Array | None
     begin: Ints
     to: Ints
+    count: int
     tests: int = 0
 
     __repr__ = short_repr
@@ -238,7 +241,7 @@ class StageResult:
     @property
     def pairs(self) -> int:
         """Work of the stage in steps from cell to cell, with the tests of pairs converted."""
-        return len(self.to) + self.tests // TESTS
+        return self.count + self.tests // TESTS
 
     @property
     def bound(self) -> float:
@@ -282,6 +285,8 @@ def solve_stage(
     care: float = np.inf,
     most: float | None = None,
     given: Array | None = None,
+    worth: float = np.inf,
+    low: float = -np.inf,
 ) -> StageResult:
     """Return the bounds that the cells prove for every motion through them.
 
@@ -298,6 +303,10 @@ def solve_stage(
         If given, pairs of steps that break (6) are excluded for motions that cost at most this.
     given : (M - 1, J, n), optional
         Slopes of the potential to try at each layer but the last.
+    worth, low : float
+        Largest cost of the motions of interest, and what the potential at the first layer is
+        expected to reach; if it does not, the work is done twice. Steps that only dearer motions
+        take are left out, and cells that only these pass have the bound infinity. Not with `most`.
 
     Raises
     ------
@@ -310,20 +319,27 @@ def solve_stage(
         raise ValueError("multipliers of (6) need cells at each of their nodes, and at no other")
     start = packed.start
     C, n = cells.center.shape
-    potential = Potential(
-        np.full((C, 2), np.inf),
-        np.zeros((C, 2, n)),
-        np.zeros((C, 2)),
-        np.zeros((C, 2)),
-        np.zeros(C),
-    )
-    potential.level[start[-2] :] = 0.0
-    begin, to, cost = _lay(packed, spans, potential, steps, multipliers, care, given)
-    ahead, behind = np.zeros(C), np.full(C, np.inf)
-    first = slice(start[0], start[1])
-    behind[first] = _least_at_first(cells.take(first), potential, first)
+    first, price = slice(start[0], start[1]), steps.price(multipliers, spans)
+    while True:
+        potential = Potential(
+            np.full((C, 2), np.inf),
+            np.zeros((C, 2, n)),
+            np.zeros((C, 2)),
+            np.zeros((C, 2)),
+            np.zeros(C),
+        )
+        potential.level[start[-2] :] = 0.0
+        dear = worth + price - low
+        begin, to, cost, count = _lay(
+            packed, spans, potential, steps, multipliers, min(care, dear), dear, given
+        )
+        ahead, behind = np.zeros(C), np.full(C, np.inf)
+        behind[first] = _least_at_first(cells.take(first), potential, first)
+        if not (least := float(behind[first].min())) < low:
+            break
+        low = least  # the potential does not depend on the steps that are left out
     cross_cells(start, begin, to, cost, ahead, behind)
-    through, price = ahead + behind, steps.price(multipliers, spans)
+    through = ahead + behind
     tests = 0
     if most is not None and len(start) > 2 and np.isfinite(through).any():
         through, tests = cross_bends(
@@ -341,6 +357,7 @@ def solve_stage(
         multipliers=multipliers,
         begin=begin,
         to=to,
+        count=count,
         tests=tests,
     )
 
@@ -375,7 +392,9 @@ def arranged(cells: CellSet, steps: Steps) -> Arranged:
     nodes, start = np.unique(cells.node, return_index=True)
     widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
     curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
-    packed = Cells(np.append(start, len(cells)), *curves, key, widest, cells.tied, cells.reach)
+    by_joint = np.ascontiguousarray(cells.center.T), np.ascontiguousarray(box.T)
+    more = cells.tied, cells.reach, *by_joint
+    packed = Cells(np.append(start, len(cells)), *curves, key, widest, *more)
     return Arranged(cells, packed, nodes.astype(np.int64), order)
 
 
@@ -406,58 +425,37 @@ def _lay(
     steps: Steps,
     multipliers: Array | None,
     care: float,
+    dear: float,
     given: Array | None = None,
-) -> tuple[Ints, Ints, Array]:
+) -> tuple[Ints, Ints, Array, int]:
     """Compute the potential from the last layer to the first; return steps and reduced costs.
 
-    The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a cost.
+    The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a cost; those that cost
+    more than `dear` are left out. Also returned is the number of all steps.
     """
     start, C = packed.start, len(packed.half)
-    count = np.zeros(C, np.int64)
-    layers: list[tuple[Ints, Array]] = []
+    count, all_steps = np.zeros(C, np.int64), 0
+    found: list[tuple[Ints, Array]] = [(np.zeros(0, np.int64), np.zeros(0))]
     threads, none = thread_count(), np.zeros((0, len(steps.weight)))
     with ThreadPoolExecutor(threads) as pool:
         for k in range(len(start) - 3, -1, -1):
             first, last = int(start[k]), int(start[k + 1])
             step = steps.tilted(multipliers, spans, k)
-            reach_cells(packed, step, k, first, last, potential.level, count)
-            begin = np.zeros(last - first + 1, np.int64)
-            np.cumsum(count[first:last], out=begin[1:])
-            to, cost = np.empty(begin[-1], np.int64), np.empty(begin[-1])
-            shifted = np.zeros(last + 1, np.int64)
-            shifted[first:] = begin
             parts = threads if last - first >= IN_ONE else 1
-            middle = np.searchsorted(begin, np.linspace(0, begin[-1], parts + 1)[1:-1])
-            ends = [first, *(first + middle).tolist(), last]
+            ends = np.linspace(first, last, parts + 1).astype(np.int64).tolist()
+            slopes = none if given is None else given[k]
             runs = [
                 pool.submit(
-                    lay_potential,
-                    packed,
-                    potential,
-                    step,
-                    k,
-                    a,
-                    b,
-                    care,
-                    none if given is None else given[k],
-                    shifted,
-                    to,
-                    cost,
+                    lay_potential, packed, potential, step, k, a, b, care, dear, slopes, count
                 )
                 for a, b in pairwise(ends)
             ]
-            for run in runs:
-                run.result()
-            layers.append((to, cost))
-    layers.reverse()
-    begin = np.concatenate([[0], np.cumsum(count)])
-    if not layers:
-        return begin, np.zeros(0, np.int64), np.zeros(0)
-    return (
-        begin,
-        np.concatenate([to for to, _ in layers]),
-        np.concatenate([cost for _, cost in layers]),
-    )
+            laid = [run.result() for run in runs]
+            all_steps += sum(tried for _, _, tried in laid)
+            found += [(to, cost) for to, cost, _ in reversed(laid)]
+    found.reverse()
+    to, cost = (np.concatenate(each) for each in zip(*found, strict=True))
+    return np.append(0, np.cumsum(count)), to, cost, all_steps
 
 
 def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array:

@@ -38,7 +38,6 @@ __all__ = [
     "bent_by",
     "blame_bends",
     "count_rejections",
-    "count_steps",
     "keep_back",
     "keep_on",
     "list_steps",
@@ -148,35 +147,35 @@ def bent_by(
 
 
 @jit
-def count_steps(cells: Cells, step: Step, lead: Ints, k: int, live: Bools, out_count: Ints) -> None:
-    """Count the steps (5) from each live cell of layer k to live cells of layer k + 1."""
-    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
-    for a in range(cells.start[k], cells.start[k + 1]):
-        count = 0
-        if live[a]:
-            window(cells, step, a, k, run)
-            for b in range(run[0], run[1]):
-                if live[b] and may_step(cells, step, lead, a, b, D):
-                    count += 1
-        out_count[a - cells.start[k]] = count
-
-
-@jit
 def list_steps(
-    cells: Cells, step: Step, lead: Ints, k: int, live: Bools, begin: Ints, out_to: Ints
-) -> None:
-    """Fill the cells that the steps counted by `count_steps` lead to; begin is (C_k + 1,)."""
+    cells: Cells, step: Step, lead: Ints, k: int, live: Bools, most: int, out_count: Ints
+) -> Ints:
+    """Return the cells to which the steps (5) from live cells of layer k to live ones lead, (E,).
+
+    They are in the order of the cells, of which ``out_count`` (C_k,) gets the numbers of steps. It
+    ends at the first cell that makes them more than ``most``.
+    """
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
-    first = cells.start[k]
+    first, number = cells.start[k], 0
+    to = np.empty(8 * (cells.start[k + 1] - first) + 8, np.int64)
+    out_count[:] = 0
     for a in range(first, cells.start[k + 1]):
-        p, last = begin[a - first], begin[a - first + 1]
-        if p == last:
+        if not live[a]:
             continue
         window(cells, step, a, k, run)
+        if number + max(0, run[1] - run[0]) > len(to):
+            wider = np.empty(2 * len(to) + run[1] - run[0], np.int64)
+            wider[:number] = to[:number]
+            to = wider
+        before = number
         for b in range(run[0], run[1]):
-            if p < last and live[b] and may_step(cells, step, lead, a, b, D):
-                out_to[p] = b
-                p += 1
+            if live[b] and may_step(cells, step, lead, a, b, D):
+                to[number] = b
+                number += 1
+        out_count[a - first] = number - before
+        if number > most:
+            break
+    return to[:number].copy()
 
 
 @jit

@@ -72,6 +72,11 @@ def jit_inline(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return _Part(function, forceinline=True, _nrt=False)
 
 
+def jit_callee(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` as `jit_inline` does, but called: for long ones that few calls share."""
+    return _Part(function, _nrt=False)
+
+
 def jit_equation(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` as `jit_inline` does, for an equation that Python also evaluates."""
     return _compiled(function, forceinline=True, _nrt=False)

@@ -6,13 +6,13 @@ may be wrong); its level is then proved: the least over all cells that a step ca
 
 from __future__ import annotations
 
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints
-from kerfpath.kernels.jit import jit, jit_inline
-from kerfpath.kernels.metric import extend, finish
+from kerfpath.kernels.jit import either, jit, jit_callee, jit_inline, jit_vector, larger
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 from kerfpath.kernels.reduced import (
     SLACK,
     Cells,
@@ -25,9 +25,9 @@ from kerfpath.kernels.reduced import (
     tangent,
     window,
 )
-from kerfpath.kernels.slopes import Spare, flatten, guess_slopes
+from kerfpath.kernels.slopes import Ahead, Spare, flatten, guess_slopes, join
 
-__all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells", "reach_cells"]
+__all__ = ["close_cut", "cross_cells", "lay_potential", "link_cells"]
 
 
 @jit_inline
@@ -101,15 +101,14 @@ def _turned(
     return moved - beyond(z, step) + ahead + lean(cells, a, z, y)
 
 
-@jit_inline
+@jit_callee
 def _level(
     cells: Cells,
     potential: Potential,
     step: Step,
     a: int,
-    ahead: Ints,
-    way: Ints,
-    D: Array,
+    ahead: Ahead,
+    count: int,
     y: Array,
     care: float,
     first: int,
@@ -124,43 +123,103 @@ def _level(
     for i in range(len(y)):
         other[i] = 0.0
     lean_here = lean(cells, a, other, y)
-    for turn in range(-1, len(ahead)):
+    for turn in range(-1, count):
         p = first if turn < 0 else turn
         if turn == first:
             continue
-        b = ahead[p]
-        if way[p] == 1:
-            far = potential.least[b] + lean_here + _apart(cells, step, a, b, D[p])
-            if far > least + care:
-                out_proved[p] = far
-                continue
-        proved = _proved(cells, potential, step, a, b, way[p], D[p], y, price, least + care, other)
+        far = ahead.least[p] + lean_here
+        if far > least + care:
+            out_proved[p] = far
+            continue
+        way = join(cells, step, a, ahead, p)
+        proved = _proved(
+            cells, potential, step, a, ahead.cell[p], way, ahead.D[p], y, price, least + care, other
+        )
         out_proved[p] = proved
         least = min(least, proved)
     return least
 
 
-@jit_inline
-def _apart(cells: Cells, step: Step, a: int, b: int, D: Array) -> float:
-    """Return the least distance of cell a from cell b, less what the tilt may take off it."""
-    total, tilted = 0.0, 0.0
-    for i in range(len(D)):
-        wide = cells.box[a, i] + cells.box[b, i]
-        x = max(0.0, abs(D[i]) - wide)
-        total = extend(total, step.weight[i] * x, step.metric)
-        tilted += step.tilt[i] * D[i] - abs(step.tilt[i]) * wide
-    away = finish(total, step.metric)
-    return away + tilted - SLACK * (away + abs(tilted))
+@jit_vector
+def _add_joint(
+    center: Array, box: Array, x: float, wide: float, weight: float, tilt: float, v: float,
+    turn: float, metric: int, out_away: Array, out_tilted: Array,
+) -> None:  # fmt: skip
+    """Add what a joint tells about the steps from a cell to a run of cells (W,), see `_apart`.
+
+    Its centre there is at ``center`` within ``box`` (W,), here at x within ``wide``; ``turn`` is a
+    full turn, or 0 if the joint is not endless. Costs are infinite beyond v.
+    """
+    for p in range(np.uint64(len(center))):
+        d = center[p] - x
+        d -= turn * np.rint(d / (2.0 * pi))
+        both, far = wide + box[p], abs(d)
+        over = weight * larger(0.0, far - both)
+        over = either(far > v + both, np.inf, over)
+        if metric == MANHATTAN:
+            out_away[p] += over
+        elif metric == CHEBYCHEV:
+            out_away[p] = larger(out_away[p], over)
+        else:
+            out_away[p] += over * over
+        round_about = either(turn > 0.0, far + both, 0.0) > pi
+        out_tilted[p] += either(round_about, -abs(tilt) * v, tilt * d - abs(tilt) * both)
 
 
 @jit_inline
-def _flat_level(potential: Potential, step: Step, ahead: Ints, other: Array) -> float:
+def _apart(
+    cells: Cells, potential: Potential, step: Step, a: int, first: int, last: int, out_least: Array,
+    spare: Array,
+) -> None:  # fmt: skip
+    """Fill the least cost of a step from cell a to each of the cells first..last-1 and on, (W,).
+
+    It is that of the least increments; infinite if no step within (5) joins the cells, or none
+    leads on from there.
+    """
+    W = last - first
+    away, tilted = out_least[:W], spare[:W]
+    for p in range(W):
+        away[p] = tilted[p] = 0.0
+    for i in range(len(step.velocity)):
+        _add_joint(
+            cells.middle[i][first:last], cells.room[i][first:last], cells.center[a, i],
+            cells.box[a, i], step.weight[i], step.tilt[i], step.velocity[i],
+            2.0 * pi if step.endless[i] else 0.0, step.metric, away, tilted,
+        )  # fmt: skip
+    for p in range(W):
+        total = away[p]
+        if step.metric != MANHATTAN and step.metric != CHEBYCHEV:
+            total = sqrt(total)
+        total = total * (1.0 - SLACK) + tilted[p] - SLACK * abs(tilted[p])
+        away[p] = potential.least[first + p] + total
+
+
+@jit_inline
+def _find_ahead(
+    cells: Cells, potential: Potential, step: Step, a: int, k: int, run: Ints, ahead: Ahead,
+    spare: Array,
+) -> int:  # fmt: skip
+    """Fill the steps that lead on from cell a of layer k; return their number."""
+    window(cells, step, a, k, run)
+    first, last, count = run[0], run[1], 0
+    if last <= first:
+        return 0
+    _apart(cells, potential, step, a, first, last, ahead.least, spare)
+    for p in range(last - first):
+        if ahead.least[p] < np.inf:
+            ahead.least[count], ahead.cell[count], ahead.way[count] = ahead.least[p], first + p, -1
+            count += 1
+    return count
+
+
+@jit_inline
+def _flat_level(potential: Potential, step: Step, ahead: Ahead, count: int, other: Array) -> float:
     """Return the level of a cut without slopes, from the least of the cells ahead."""
     for i in range(len(other)):
         other[i] = 0.0
     least = np.inf
-    for p in range(len(ahead)):
-        least = min(least, potential.least[ahead[p]])
+    for p in range(count):
+        least = min(least, potential.least[ahead.cell[p]])
     return least - beyond(other, step)
 
 
@@ -179,24 +238,6 @@ def close_cut(cells: Cells, potential: Potential, a: int, none: Array) -> None:
 
 
 @jit
-def reach_cells(
-    cells: Cells, step: Step, k: int, first: int, last: int, level: Array, out_count: Ints
-) -> None:
-    """Count the live cells of layer k + 1 that a step from cells first..last-1 of layer k reaches.
-
-    A cell is live if its level (C, 2) is finite: from others no motion leads to the end.
-    """
-    run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
-    for a in range(first, last):
-        window(cells, step, a, k, run)
-        count = 0
-        for b in range(run[0], run[1]):
-            if level[b, 0] < np.inf and near(cells, step, a, b, D) > 0:
-                count += 1
-        out_count[a] = count
-
-
-@jit
 def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: Bools) -> None:
     """Mark the cells of layer k from which a step leads on, and those of layer k + 1 it reaches."""
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
@@ -207,21 +248,20 @@ def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: B
                 out_after[a] = out_before[b] = True
 
 
-@jit_inline
+@jit_callee
 def _lay_given(
-    cells: Cells, potential: Potential, step: Step, a: int, ahead: Ints, way: Ints, D: Array,
-    given: Array, flat: float, care: float, here: Array, floor: Array, spare: Spare, y: Array,
-    other: Array, proved: Array, out_cost: Array,
-) -> None:  # fmt: skip
+    cells: Cells, potential: Potential, step: Step, a: int, ahead: Ahead, count: int, given: Array,
+    flat: float, care: float, here: Array, spare: Spare, y: Array, other: Array, proved: Array,
+) -> tuple[int, int]:  # fmt: skip
     """Lay both cuts of cell a by the best of the given slopes, of a guess, and of none at all.
 
-    ``proved`` (3, E) is scratch.
+    Returns the rows of ``proved`` (3, E) that have the least costs of the steps by both cuts.
     """
-    n, J, count = len(y), len(given), len(ahead)
+    n, J = len(y), len(given)
     one, two, free = 0, 1, 2
     kept, sure = -np.inf, -np.inf
     potential.level[a, 0] = potential.level[a, 1] = -np.inf
-    best = guess_slopes(cells, potential, step, a, 0.0, ahead, D, here, floor, spare, y)
+    best = guess_slopes(cells, potential, step, a, 0.0, ahead, count, here, spare, y)
     for j in range(J + 2):
         for i in range(n):
             if j > J:
@@ -231,7 +271,7 @@ def _lay_given(
         if j > J and max(kept, sure) >= flat:
             break
         flatten(cells, a, y)
-        level = _level(cells, potential, step, a, ahead, way, D, y, care, best, other, proved[free])
+        level = _level(cells, potential, step, a, ahead, count, y, care, best, other, proved[free])
         for i in range(n):
             other[i] = 0.0
         least = level + lean(cells, a, other, y)
@@ -250,10 +290,7 @@ def _lay_given(
                 potential.dual[a, 1, i] = y[i]
             potential.level[a, 1], sure = level, least
             two, free = free, two
-    for p in range(count):
-        to_first = proved[one, p] - potential.level[a, 0]
-        out_cost[p] = min(to_first, proved[two, p] - potential.level[a, 1])
-    close_cut(cells, potential, a, other)
+    return one, two
 
 
 @jit
@@ -265,72 +302,80 @@ def lay_potential(
     first: int,
     last: int,
     care: float,
+    dear: float,
     given: Array,
-    begin: Ints,
-    out_to: Ints,
-    out_cost: Array,
-) -> None:
-    """Lay the potential over cells first..last-1 of layer k; fill the reduced costs of their steps.
+    out_count: Ints,
+) -> tuple[Ints, Array, int]:
+    """Lay the potential over cells first..last-1 of layer k; return the steps from them.
 
-    The steps of cell a are begin[a]..begin[a+1]-1; out_to has the cell that each leads to. Steps
-    that cost more than `care` beyond the cheapest may get a smaller bound than could be proved.
-    ``given`` (J, n) are slopes to try besides those that are guessed; without any there are guesses
-    from both ends of each cell.
+    Returned are the cell that each step leads to, ascending, and its reduced cost, in the order of
+    the cells, of which ``out_count`` (C,) gets the numbers of steps; and the number of all steps
+    within (5). Steps whose reduced cost exceeds ``dear`` are left out. Those that cost more than
+    ``care`` beyond the cheapest may get a smaller bound than could be proved. ``given`` (J, n) are
+    slopes to try besides those that are guessed; without any there are guesses from both ends of
+    each cell.
     """
-    n, most = len(step.velocity), 0
-    for a in range(first, last):
-        most = max(most, begin[a + 1] - begin[a])
-    D, way, proved = np.empty((most, n)), np.empty(most, np.int64), np.empty((3, most))
-    floor, here, y, other = np.empty(most), np.empty(n), np.empty(n), np.empty(n)
+    n, most = len(step.velocity), cells.start[k + 2] - cells.start[k + 1]
+    ahead = Ahead(
+        np.empty(most, np.int64), np.empty(most), np.empty((most, n)), np.empty(most, np.int64)
+    )
+    proved, more = np.empty((3, most)), np.empty(most)
+    here, y, other = np.empty(n), np.empty(n), np.empty(n)
     run, P = np.empty(2, np.int64), 1 + cells.reach.shape[1]
     spare = Spare(
         np.empty((P, n)), np.empty((P, 2)), np.empty(P), np.empty(P), np.empty(2),
         np.empty(3 * n + 3),
     )  # fmt: skip
+    to, cost = np.empty(8 * (last - first) + most, np.int64), np.empty(8 * (last - first) + most)
+    kept, tried = 0, 0
     for a in range(first, last):
-        count = begin[a + 1] - begin[a]
-        potential.level[a, 0] = potential.level[a, 1] = np.inf
+        count = _find_ahead(cells, potential, step, a, k, run, ahead, more)
+        tried += count
+        out_count[a] = 0
         if count == 0:
+            potential.level[a, 0] = potential.level[a, 1] = potential.least[a] = np.inf
             continue
-        ahead = out_to[begin[a] : begin[a + 1]]
-        window(cells, step, a, k, run)
-        p = 0
-        for b in range(run[0], run[1]):
-            if potential.level[b, 0] < np.inf:
-                way[p] = near(cells, step, a, b, D[p])
-                if way[p] > 0:
-                    ahead[p] = b
-                    p += 1
-                    if p == count:
-                        break
-        flat = _flat_level(potential, step, ahead, other)
+        flat, one, two = _flat_level(potential, step, ahead, count, other), 0, 1
         if len(given) > 0:
-            _lay_given(
-                cells, potential, step, a, ahead, way, D, given, flat, care, here, floor, spare,
-                y, other, proved, out_cost[begin[a] : begin[a + 1]],
+            one, two = _lay_given(
+                cells, potential, step, a, ahead, count, given, flat, care, here, spare, y, other,
+                proved,
             )  # fmt: skip
-            continue
-        for m in range(2):
-            t = (2 * m - 1) * cells.half[a]
-            best = guess_slopes(cells, potential, step, a, t, ahead, D, here, floor, spare, y)
-            if m == 1:
-                flatten(cells, a, y)
-            level = -np.inf
-            for attempt in range(2):
-                if attempt == 1 and level < flat:
-                    for i in range(n):
-                        y[i] = 0.0
-                if attempt == 0 or level < flat:
-                    level = _level(
-                        cells, potential, step, a, ahead, way, D, y, care, best, other, proved[m]
-                    )
-            potential.level[a, m] = level
-            for i in range(n):
-                potential.dual[a, m, i] = y[i]
-        for p in range(count):
-            to_first = proved[0, p] - potential.level[a, 0]
-            out_cost[begin[a] + p] = min(to_first, proved[1, p] - potential.level[a, 1])
+        else:
+            for m in range(2):
+                t = (2 * m - 1) * cells.half[a]
+                best = guess_slopes(cells, potential, step, a, t, ahead, count, here, spare, y)
+                if m == 1:
+                    flatten(cells, a, y)
+                level = -np.inf
+                for attempt in range(2):
+                    if attempt == 1 and level < flat:
+                        for i in range(n):
+                            y[i] = 0.0
+                    if attempt == 0 or level < flat:
+                        level = _level(
+                            cells, potential, step, a, ahead, count, y, care, best, other, proved[m]
+                        )
+                potential.level[a, m] = level
+                for i in range(n):
+                    potential.dual[a, m, i] = y[i]
         close_cut(cells, potential, a, other)
+        if kept + count > len(to):
+            wider_to, wider_cost = (
+                np.empty(2 * len(to) + count, np.int64),
+                np.empty(2 * len(to) + count),
+            )
+            wider_to[:kept], wider_cost[:kept] = to[:kept], cost[:kept]
+            to, cost = wider_to, wider_cost
+        before = kept
+        for p in range(count):
+            by_one = proved[one, p] - potential.level[a, 0]
+            reduced = min(by_one, proved[two, p] - potential.level[a, 1])
+            if reduced <= dear:
+                to[kept], cost[kept] = ahead.cell[p], reduced
+                kept += 1
+        out_count[a] = kept - before
+    return to[:kept].copy(), cost[:kept].copy(), tried
 
 
 @jit

@@ -51,7 +51,7 @@ class Cells(NamedTuple):
     (uncertainty of the joint, rad) and ``box`` (how far a joint may be from its centre) are (C, n).
     ``half`` is (C,) rad; ``widest`` (K,) is the largest box of the joint ``key`` in each layer.
     ``tied`` (C, M, n) are the slopes of the joints by M further parameters, whose sizes are at most
-    ``reach`` (C, M).
+    ``reach`` (C, M). ``middle`` and ``room`` (n, C) are ``center`` and ``box`` joint by joint.
     """
 
     start: Ints
@@ -65,6 +65,8 @@ class Cells(NamedTuple):
     widest: Array
     tied: Array
     reach: Array
+    middle: Array
+    room: Array
 
 
 class Potential(NamedTuple):

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
-from kerfpath.kernels.jit import jit_inline
+from kerfpath.kernels.jit import jit_callee, jit_inline
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, extend, finish
-from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
+from kerfpath.kernels.reduced import Cells, Potential, Step, near, tangent
 
-__all__ = ["Spare", "flatten", "guess_slopes"]
+__all__ = ["Ahead", "Spare", "flatten", "guess_slopes", "join"]
 
 PENALTY = 10.0
 """Price of an increment beyond (5), in weights: it leads a guess back within (5)."""
@@ -30,6 +30,27 @@ ROUNDS = 3
 UNSURE = 0.03
 """rad: a joint that is less certain than this on a cell gets no slope. The slope would lose more
 than it gains wherever the cells that lead there do not have the same slope."""
+
+
+class Ahead(NamedTuple):
+    """Steps from a cell: to each ``cell`` (E,), with the least cost (E,) there and on.
+
+    ``D`` (E, n) is the difference of the centres, and ``way`` (E,) whether it is definite, as
+    `near` tells; -1 where it is not known yet.
+    """
+
+    cell: Ints
+    least: Array
+    D: Array
+    way: Ints
+
+
+@jit_inline
+def join(cells: Cells, step: Step, a: int, ahead: Ahead, p: int) -> int:
+    """Return the way of a step from cell a, and fill in its difference."""
+    if ahead.way[p] < 0:
+        ahead.way[p] = near(cells, step, a, ahead.cell[p], ahead.D[p])
+    return int(ahead.way[p])
 
 
 class Spare(NamedTuple):
@@ -297,47 +318,52 @@ def _balance_all(
 
 
 @jit_inline
+def _from_place(cells: Cells, a: int, t: float, D: Array, out_here: Array) -> None:
+    """Fill the increments (n,) from t in cell a to the centre of a cell that is D away."""
+    for i in range(len(D)):
+        out_here[i] = D[i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+
+
+@jit_callee
 def guess_slopes(
     cells: Cells,
     potential: Potential,
     step: Step,
     a: int,
     t: float,
-    ahead: Ints,
-    D: Array,
+    ahead: Ahead,
+    count: int,
     here: Array,
-    floor: Array,
     spare: Spare,
     out_y: Array,
 ) -> int:
     """Fill the slopes of the step that seems best from t in cell a; return its index in `ahead`."""
-    first, least = -1, np.inf
-    for p in range(len(ahead)):
-        b, reach = ahead[p], 0.0
+    first = 0
+    for p in range(count):
+        if ahead.least[p] < ahead.least[first]:
+            first = p
+    best, at, to = np.inf, 0.0, -1
+    for turn in range(-1, count):
+        p = first if turn < 0 else turn
+        if ahead.least[p] >= best or (turn >= 0 and p == first):
+            continue
+        join(cells, step, a, ahead, p)
+        _from_place(cells, a, t, ahead.D[p], here)
+        b, reach = ahead.cell[p], 0.0
         for i in range(len(here)):
-            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
             reach += (step.weight[i] + abs(step.tilt[i])) * abs(cells.slope[b, i])
         reach += max(abs(potential.along[b, 0]), abs(potential.along[b, 1]))
         price = _price(here, cells, potential, step, b, 0.0, 0.0)
-        floor[p] = price - reach * cells.half[b]
-        if price < least:
-            first, least = p, price
-    best, at, to = np.inf, 0.0, -1
-    for turn in range(-1, len(ahead)):
-        p = first if turn < 0 else turn
-        if floor[p] >= best or (turn >= 0 and p == first):
+        if price - reach * cells.half[b] >= best:
             continue
-        for i in range(len(here)):
-            here[i] = D[p, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
-        where, price = _best_along(here, cells, potential, step, ahead[p])
+        where, price = _best_along(here, cells, potential, step, b)
         if price < best:
             best, at, to = price, where, p
-    for i in range(len(here)):
-        here[i] = D[to, i] - (cells.slope[a, i] + cells.bend[a, i] * t / 2.0) * t
+    _from_place(cells, a, t, ahead.D[to], here)
     if cells.reach.shape[1] > 0:
-        _balance_all(here, cells, potential, step, ahead[to], at, spare, out_y)
+        _balance_all(here, cells, potential, step, ahead.cell[to], at, spare, out_y)
     else:
-        _balance(here, cells, potential, step, ahead[to], at, out_y)
+        _balance(here, cells, potential, step, ahead.cell[to], at, out_y)
     return to
 
 
