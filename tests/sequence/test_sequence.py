@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 import kerfpath
-from kerfpath import Contour, InputError, NoFeasiblePath, plan
+from kerfpath import Contour, InputError, NoFeasiblePath, Plan, plan
 from kerfpath.auditor import transfer_checks
 from kerfpath.cell import box_between, cell_of
 from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight
 from kerfpath.sequence import (
+    PlannedCuts,
     best_order,
     common_postures,
     inner_first,
     longest_search,
+    order_candidates,
     order_plans,
     plan_part,
 )
@@ -487,3 +489,61 @@ def test_an_end_that_may_not_be_first_or_last_is_left_in_the_middle():
     assert order.candidates.tolist() == [2, 0, 1]
     with pytest.raises(InputError, match="first: expected 3 times >= 0"):
         best_order([0, 1, 2], np.ones(3), between, first=[-1, 0, 0])
+
+
+class Settled(PlannedCuts[Plan]):
+    """Candidates whose final form cuts slower by a factor; those of some contours are refused."""
+
+    def __init__(self, factor: float, refused: int = 0) -> None:
+        self.factor, self.left, self.seen = factor, refused, list[Plan]()
+
+    def plan_of(self, one: Plan) -> Plan:
+        return one
+
+    def in_posture(self, contour: int, posture: int, *, quick: bool) -> Plan | None:
+        return None
+
+    def with_plan(self, one: Plan, plan: Plan) -> Plan | None:
+        return plan
+
+    def settled(self, one: Plan) -> Plan | None:
+        self.seen.append(one)
+        if self.left:
+            self.left -= 1
+            return None
+        return replace(one, q=one.q + 1e-9, time=one.time * self.factor)
+
+
+@pytest.fixture(scope="module")
+def two_starts(part, arm, tool, placement):
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": np.radians(30)}
+    starts = [(loop, start_at(loop, loop.s[30])) for loop in part[:3]]
+    return [[plan(c, arm, **asked, certify=None) for c in both] for both in starts]
+
+
+def ordered(two_starts, cuts):
+    none = [()] * len(two_starts)
+    return order_candidates([list(each) for each in two_starts], cuts, none, none)
+
+
+def test_only_the_chosen_candidates_are_brought_into_their_final_form(two_starts):
+    cuts = Settled(1.0)
+    found = ordered(two_starts, cuts)
+    assert len(cuts.seen) == len(found.plans) == 3
+    assert found.order.duration == pytest.approx(order_plans(two_starts).order.duration, rel=1e-6)
+    assert found.order.at_least <= found.order.duration
+    chosen = {(made.name, made.q[0].tobytes()) for made in found.plans}
+    assert chosen == {(made.name, (made.q[0] + 1e-9).tobytes()) for made in cuts.seen}
+
+
+def test_others_are_chosen_where_the_final_form_is_refused_or_much_slower(two_starts):
+    refusing = Settled(1.0, refused=1)
+    found = ordered(two_starts, refusing)
+    assert len(refusing.seen) == 4
+    assert refusing.seen[0].name in {made.name for made in found.plans}
+    slower = Settled(2.0)
+    found = ordered(two_starts, slower)
+    assert len(slower.seen) == 6  # the others looked better until they were settled, too
+    assert found.cutting_time == pytest.approx(2 * sum(made[0].time[-1] for made in two_starts))
+    with pytest.raises(NoFeasiblePath, match="none of its plans may be used"):
+        ordered(two_starts, Settled(1.0, refused=6))
