@@ -332,6 +332,22 @@ def courses(robot, step, branches):
     return list(islice(valleys.courses(), 12))
 
 
+@pytest.mark.parametrize("share", [0.05, 0.4, 1.0, 2.5])
+def test_a_time_is_that_of_steps_between_the_least_ones_and_equal_ones(screening, courses, share):
+    """Steps under (5) are a bound from below, steps all as long as the sharpest one from above."""
+    q = np.array([course.q for course in courses])
+    energy = screening.energy
+    faster = energy._replace(
+        velocity=energy.velocity * share, acceleration=energy.acceleration * share**2
+    )
+    time, interval = (
+        replace(screening, energy=faster, aim=aim).scores(q) for aim in ("time", "interval")
+    )
+    fast = np.abs(np.diff(q, axis=1) / faster.velocity).max(axis=2)
+    assert (time >= np.maximum(fast, 1.0).sum(axis=1)).all()
+    assert (time <= fast.shape[1] * np.maximum(interval, 1.0) + 1e-9).all()
+
+
 @pytest.mark.parametrize("stages", [SMOOTH, SHARP])
 def test_screened_motions_are_motions_of_the_arm_and_better_than_their_courses(
     robot, frames, tool, screening, courses, stages

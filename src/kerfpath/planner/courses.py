@@ -23,7 +23,7 @@ from kerfpath.effort import current_effort
 from kerfpath.kernels.continuous import Steps
 from kerfpath.kernels.screening import Energy
 from kerfpath.planner.branches import sample_branches
-from kerfpath.planner.screening import Screening, Stage
+from kerfpath.planner.screening import Aim, Screening, Stage
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 from kerfpath.robots import lowest_joint
@@ -69,11 +69,11 @@ class Courses:
     ----------
     task : Task
         A task that `can_explore`.
-    quickest : bool
-        Whether motions are compared by how far they exceed the limits, and not by their cost.
+    aim : {"cost", "interval", "time"}
+        What motions are compared by, as in `Screening`.
     """
 
-    def __init__(self, task: Task, *, quickest: bool = False) -> None:
+    def __init__(self, task: Task, *, aim: Aim = "cost") -> None:
         self._task = task
         s, robot, tool = task.settings, task.robot, task.setup.tool
         self._frames = task.setup.placement @ task.contour.frames(s.frames)
@@ -97,7 +97,7 @@ class Courses:
                 price=0.0,
                 table=change_table(s.limits(robot)),
             ),
-            quickest=quickest,
+            aim=aim,
         )
         self._allowed = _postures_of(task)
         self._rng = np.random.default_rng(SEED)

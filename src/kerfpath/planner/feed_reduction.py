@@ -9,23 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from kerfpath import refiner
 from kerfpath.effort import current_effort
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.courses import Courses, can_explore
 from kerfpath.planner.impossible import motion_test
-from kerfpath.planner.quickest import alike, clear_paths
+from kerfpath.planner.quickest import MANY, alike, clear_paths, without_aim
 from kerfpath.planner.refinements import plan_first_order
+from kerfpath.planner.screening import QUICK
 from kerfpath.planner.starts import Bounds, refined_clear
 from kerfpath.planner.statements import STOPPED
 from kerfpath.planner.straight_moves import follows, least_times
 from kerfpath.planner.task import Task
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan, Proof, has_room
 from kerfpath.progress import StopEarly, counted, unstopped
 from kerfpath.refiner import Refinement
 from kerfpath.retime import feed, retime
+from kerfpath.robots import lowest_joint
 from kerfpath.search import (
     BeamWidth,
     ContinuousPath,
@@ -43,6 +47,16 @@ PROGRAMS = 10
 """Most convex programs that reduce the excess; sixty gained 0.1 % of the time on 728 nodes."""
 STEPS = 100
 """Convex programs and beam searches that this usually takes, to estimate the time left."""
+LOST = 1e-3
+"""Share of the time that a plan may lose before motions through all valleys are slowed, too."""
+SAME_TIME = 1e-4
+"""Share of the time by which plans that differ count as equally quick: that of `retime`."""
+SLOWED, SHORTENED = 8, 2
+"""Screened motions that are slowed down, and the quickest motions that are shortened."""
+TAKEN, LEAST_TAKEN, GAIN = 0.1, 0.01, 5e-4
+"""Share of the lost time that is taken at once, first and at last, and least relative gain."""
+ROUNDS, HURRIED = 16, 3
+"""Most times that time is taken, fewer over more than `MANY` nodes, and convex programs of each."""
 NEARLY = 1.02
 """Time of a plan with a reduced feed, relative to that at the speed asked for, up to which a motion
 at that speed throughout is looked for."""
@@ -56,8 +70,9 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
     """Return the quickest motion found, at the speed asked for where the limits allow it.
 
     The paths to slow down are those of beam searches: at the speed asked for without (6), and with
-    all limits at the highest constant speed of `SLOWER` that has one. Of equally quick motions it
-    is the cheapest. None if no path was found or none stays clear of the cell.
+    all limits at the highest constant speed of `SLOWER` that has one. Where they lose time, courses
+    through all valleys are screened for the least time, and the best are slowed down. Of equally
+    quick motions it is the cheapest. None if no path was found or none stays clear of the cell.
     """
     clear: list[Plan] = []
     tried: list[Plan] = []
@@ -69,6 +84,10 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
                     tried.append(made)
                     slowed = _slowed_between(task, finder, path, made)
                     clear += [] if slowed is None else [slowed]
+            if not any(_hardly_slower(task, made) for made in clear):
+                clear += _through_valleys(task, finder) if can_explore(task) else []
+                for made in sorted(clear, key=_quickest_followed)[:SHORTENED]:
+                    clear += _shortened(task, finder, made)
     except StopEarly:
         if not clear:
             with unstopped():
@@ -79,7 +98,7 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
         if not clear:
             raise
         clear = [replace(plan, proof=plan.proof.also(STOPPED)) for plan in clear]
-    return min(clear, key=_quickest_followed) if clear else None
+    return _cheapest_of_quickest(clear) if clear else None
 
 
 def may_keep_speed(task: Task, made: Plan) -> bool:
@@ -135,6 +154,58 @@ def _slowed_between(
     if found is None and _broken(task, finder, slowed):
         return None
     return replace(slowed, proof=_claim(finder))
+
+
+def _hardly_slower(task: Task, made: Plan) -> bool:
+    """Return whether a plan that the arm can follow loses hardly any time."""
+    return follows(made) and bool(made.time[-1] <= (1 + LOST) * task.times[-1])
+
+
+def _through_valleys(task: Task, finder: CollisionFreeSearch) -> list[Plan]:
+    """Return motions through all valleys, slowed down, clear, the quickest ones."""
+    courses = Courses(without_aim(task), aim="time")
+    slowed = list[Plan]()
+    for _, course in islice(courses.screened(courses.all(), QUICK), SLOWED):
+        made = _with_reduced_excess(task, task.plan_at(*course, _claim(finder)))
+        if not any(alike(made, other) for other in slowed):
+            slowed.append(made)
+    return [made for made in slowed if _is_admitted(task, finder, made)]
+
+
+def _is_admitted(task: Task, finder: CollisionFreeSearch, made: Plan) -> bool:
+    """Return whether a motion keeps ranges, margins, floor and room at its ends, and is clear."""
+    asked, ends = task.settings, [0, -1]
+    if not np.isfinite(refiner.promise(made)) or _broken(task, finder, made):
+        return False
+    if asked.floor is not None and (lowest_joint(task.robot, made.q) < asked.floor).any():
+        return False
+    if asked.retract is None:
+        return True
+    room = has_room(asked, task.robot, made.q[ends], made.posture[ends], task.setup.tool)
+    return bool(room.all())
+
+
+def _shortened(task: Task, finder: CollisionFreeSearch, made: Plan) -> list[Plan]:
+    """Return the plan with less time lost, and that moved to less cost; none if it cannot be.
+
+    A share of the time that every interval loses is taken from it, and gamma moves to exceed the
+    limits little at these times. Where this gains no time, less is taken.
+    """
+    begun, taken = made, TAKEN
+    for _ in range(max(1, ROUNDS * MANY // max(MANY, len(task.contour)))):
+        hurried = np.cumsum(task.dt + (1 - taken) * (np.diff(made.time) - task.dt))
+        start = replace(made, time=np.concatenate([[0.0], hurried]))
+        moved = _with_reduced_excess(task, start, most=HURRIED)
+        if moved.time[-1] < (1 - GAIN) * made.time[-1] and _is_admitted(task, finder, moved):
+            made = moved
+            continue
+        taken /= 2
+        if taken < LEAST_TAKEN:
+            break
+    cheaper = _with_least_times(task, refiner.refine(made).plan)
+    shortened = [] if made is begun else [made]
+    found = [*shortened, cheaper] if _is_admitted(task, finder, cheaper) else shortened
+    return [replace(each, proof=_claim(finder)) for each in found]
 
 
 # -----------------------------------------------------------------------------
@@ -217,6 +288,16 @@ def _quickest_followed(made: Plan) -> tuple[bool, float, float]:
     return (not follows(made), *_time_and_cost(made))
 
 
+def _cheapest_of_quickest(plans: list[Plan]) -> Plan:
+    """Return the cheapest of the plans that take the least time, as far as `retime` finds it.
+
+    Plans whose moves the arm can follow come first.
+    """
+    followed = [made for made in plans if follows(made)] or plans
+    enough = (1 + SAME_TIME) * min(float(made.time[-1]) for made in followed)
+    return min((made for made in followed if made.time[-1] <= enough), key=lambda made: made.cost)
+
+
 def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
     """Return what a plan off the grid would break, as text; "" if nothing."""
     comfort = task.settings.comfort
@@ -225,9 +306,11 @@ def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
     return "" if finder.is_clear(made) else "not be clear"
 
 
-def _with_reduced_excess(task: Task, start: Plan, within: Bounds | None = None) -> Plan:
+def _with_reduced_excess(
+    task: Task, start: Plan, within: Bounds | None = None, most: int = PROGRAMS
+) -> Plan:
     """Return the plan with gamma moved to exceed the limits little, with the least times."""
-    return _with_least_times(task, refiner.reduce_excess(start, within=within, most=PROGRAMS))
+    return _with_least_times(task, refiner.reduce_excess(start, within=within, most=most))
 
 
 def _with_least_times(task: Task, made: Plan) -> Plan:

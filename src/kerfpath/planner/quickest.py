@@ -101,7 +101,7 @@ def quick_motions(
     NoFeasiblePath
         No path on the grid is clear at any speed.
     """
-    task = _without_aim(task)
+    task = without_aim(task)
     best = _along(task, finder.find(find_least_interval, task.problem))
     path = best.plan
     yield best
@@ -171,7 +171,7 @@ def _through_valleys(
     There are fewer while the best one takes longer than `enough`, s.
     """
     ahead = _at(task, best.dt / factor)
-    courses = Courses(ahead, quickest=True)
+    courses = Courses(ahead, aim="interval")
     screened = courses.screened(courses.all(), QUICK)
     yield from _quickened(ahead, finder, screened, best, known, enough)
 
@@ -184,7 +184,7 @@ def _shaken(
     for _ in range(ROUNDS):
         if best is not shaken:  # else the changes are the same, and the next of them are tried
             shaken, ahead = best, _at(task, best.dt / FACTORS[0])
-            courses = Courses(ahead, quickest=True)
+            courses = Courses(ahead, aim="interval")
             screened = courses.screened(courses.shaken([best.plan]), QUICK)
         for found in _quickened(ahead, finder, screened, best, known):
             best = found
@@ -224,7 +224,7 @@ def velocity_limited_motions(
     path by the velocities alone, and that path with gamma moved off the grid. Raises as
     `quick_motions`.
     """
-    slow = _without_aim(task)
+    slow = without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
     if edges_allowed(slow.problem, path.dt) <= current_effort().exact_edges:
         yield from quick_motions(task, finder, wanted=wanted)
@@ -242,7 +242,7 @@ def _along(task: Task, least: LeastInterval) -> QuickMotion:
     return QuickMotion(plan=path, at=at, on_grid=least.dt)
 
 
-def _without_aim(task: Task) -> Task:
+def without_aim(task: Task) -> Task:
     """Return the task of the fastest speed: no costs, no closure, default distances."""
     velocity, _ = task.robot.speed_limits()
     settings = replace(
@@ -282,7 +282,7 @@ def quickest_along(task: Task, finder: CollisionFreeSearch, path: ContinuousPath
 
     None if it leaves the reach of its posture, or is not clear.
     """
-    task = _without_aim(task)
+    task = without_aim(task)
     found = _at_least_interval(task.plan_between(path, _claim()))
     return None if found is None or not _allowed(task, finder, found[0]) else found[0]
 

@@ -9,7 +9,7 @@ is for the refinement, which alone decides whether a motion keeps the limits.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -69,6 +69,9 @@ ALIKE, SAME_SCORE = 0.03, 0.02
 OVER, OUTSIDE, NEGLIGIBLE = 0.2, 10.0, 0.01
 """Scores are costs times 1 + OVER per limit exceeded by once the limit, and OUTSIDE per rad out of
 a range, if it is more than NEGLIGIBLE rad."""
+Aim = Literal["cost", "interval", "time"]
+"""What motions are compared by: their cost, the least interval that all their steps can have, or
+the time that they take where every step has its own interval, at least the one asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,8 +111,8 @@ class Screening:
     limits : JointLimits
     energy : Energy
         Weights, metric, objective and limits; the rest is set by the stages.
-    quickest : bool
-        Whether the score of a motion is the time that it needs, and not its cost.
+    aim : {"cost", "interval", "time"}
+        What the score of a motion is, intervals and times in intervals asked for.
     """
 
     robot: Robot
@@ -117,7 +120,7 @@ class Screening:
     tool: Array
     limits: JointLimits
     energy: Energy
-    quickest: bool = False
+    aim: Aim = "cost"
 
     __repr__ = short_repr
 
@@ -235,9 +238,10 @@ class Screening:
         return np.asarray(np.sqrt((d * d).sum(axis=2)))
 
     def scores(self, q: Array) -> Array:
-        """Return the cost (S,) of motions, more for those that break limits.
+        """Return the score (S,) of motions by the aim, more for those that break limits.
 
-        With `quickest`, it is the least time of their steps under (5) and (6), in node intervals.
+        An interval, and the time of a step, is the least under (5) and (6). A time counts (6) where
+        two steps meet as if both were equally long, so it is an estimate.
         """
         dq = np.diff(q, axis=1)
         fast = np.abs(dq / self.energy.velocity).max(axis=2)
@@ -245,15 +249,20 @@ class Screening:
         sharp = np.abs(np.diff(dq, axis=1) / most).max(axis=2)
         out = np.maximum(self.energy.lower - q, q - self.energy.upper).max(axis=(1, 2))
         out = np.where(out > NEGLIGIBLE, out, 0.0)
-        if self.quickest:
-            return np.asarray(
-                np.maximum(fast.max(axis=1), np.sqrt(sharp.max(axis=1, initial=0.0)))
-                * (1 + OUTSIDE * out)
-            )
-        lengths = self._distances(q)
-        cost = lengths.max(axis=1) if self.energy.minimax else lengths.sum(axis=1)
-        over = np.maximum(fast - 1, 0).sum(axis=1) + np.maximum(sharp - 1, 0).sum(axis=1)
-        return np.asarray(cost * (1 + OVER * over + OUTSIDE * out))
+        if self.aim == "cost":
+            lengths = self._distances(q)
+            cost = lengths.max(axis=1) if self.energy.minimax else lengths.sum(axis=1)
+            over = np.maximum(fast - 1, 0).sum(axis=1) + np.maximum(sharp - 1, 0).sum(axis=1)
+            return np.asarray(cost * (1 + OVER * over + OUTSIDE * out))
+        slow = np.sqrt(sharp)
+        if self.aim == "interval":
+            time = np.maximum(fast.max(axis=1), slow.max(axis=1, initial=0.0))
+        else:
+            tau = np.maximum(fast, 1.0)
+            tau[:, 1:] = np.maximum(tau[:, 1:], slow)
+            tau[:, :-1] = np.maximum(tau[:, :-1], slow)
+            time = tau.sum(axis=1)
+        return np.asarray(time * (1 + OUTSIDE * out))
 
 
 def within(limits: JointLimits, q: Array) -> Array:
