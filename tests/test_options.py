@@ -139,9 +139,8 @@ def test_a_value_out_of_range_is_refused_by_its_name(name, value):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("gap", 0, "expected a number above 0, got 0"),
-        ("gap", -0.1, "expected a number above 0, got -0.1"),
-        ("gap", np.nan, "expected a number above 0, got nan"),
+        ("gap", -0.1, "must not be negative, got -0.1"),
+        ("gap", np.nan, "expected a finite number, got nan"),
         ("gap", 1.5, "expected a share of the cost up to 1, got 1.5"),
         ("gap", "small", "expected a number, got 'small'"),
         ("seconds", 0, "expected a number above 0 s, got 0 s"),

@@ -28,18 +28,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath.arrays import Array, scalar, short_repr
+from kerfpath.arrays import Array, not_negative, scalar, short_repr
 from kerfpath.errors import InputError
 from kerfpath.setting import Settings, documented, setting
 
 __all__ = [
     "ALLOWANCE",
     "BASE",
+    "LEAST_GAP",
     "LIFTS",
     "USUAL",
     "Certificate",
     "Certify",
     "Stage",
+    "allowance",
     "cell_bounds",
 ]
 
@@ -50,6 +52,17 @@ LIFTS = 8
 ALLOWANCE = 2e-4
 """Share of the plan's cost by which the stated bound is below the computed one, because a checker's
 enclosure of the same joints may be a little wider."""
+LEAST_GAP = 2e-5
+"""Smallest gap that the certifier tries to reach; below it, rounding and the tolerance of the
+program that gives the multipliers decide."""
+
+
+def allowance(gap: float, *, checkable: bool) -> float:
+    """Return the share of the cost by which the stated bound is below the computed one.
+
+    Where nobody checks the bound it is at most half of the gap asked for.
+    """
+    return ALLOWANCE if checkable else min(ALLOWANCE, gap / 2)
 
 
 @documented
@@ -60,14 +73,15 @@ class Certify(Settings):
     Raises
     ------
     InputError
-        A gap or a time that is not positive, or a gap over 1.
+        A gap below 0 or over 1, or a time that is not positive.
     """
 
     gap: float = setting(
         0.5,
-        "gap at which the certifier stops: the share of the plan's cost between bound and cost",
+        "gap at which the certifier stops: the share of the plan's cost between bound and cost; 0: "
+        "the smallest that it can prove, 0.002 % of the cost",
         unit="%",
-        above=0,
+        least=0,
         most=100,
         example="0.5",
         key="certify_gap_percent",
@@ -97,7 +111,7 @@ class Certify(Settings):
     )
 
     def __post_init__(self) -> None:
-        gap = scalar(self.gap, "certify gap", above=0.0)
+        gap = not_negative(self.gap, "certify gap")
         if gap > 1:
             raise InputError(f"certify gap: expected a share of the cost up to 1, got {gap:g}")
         object.__setattr__(self, "gap", gap)

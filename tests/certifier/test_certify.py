@@ -288,8 +288,8 @@ def test_what_is_not_proved_says_why(made):
     assert found.statement == "no bound is proved: its cost is not above 0"
 
 
-@pytest.mark.parametrize("bad", [{"gap": 0.0}, {"gap": -1.0}, {"seconds": 0.0}, {"gap": np.nan}])
-def test_a_gap_and_a_time_are_positive(made, bad):
+@pytest.mark.parametrize("bad", [{"gap": -1.0}, {"seconds": 0.0}, {"gap": np.nan}])
+def test_a_gap_is_not_negative_and_a_time_positive(made, bad):
     (name,) = bad
     with pytest.raises(InputError, match=name):
         certify(made("manhattan"), **bad)

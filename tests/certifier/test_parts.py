@@ -265,8 +265,9 @@ def test_steps_that_may_not_follow_each_other_are_left_out(nodes, planned, monke
     cells = cells.take(near & (cells.posture == best.posture[0]))
     seen = []
 
-    def kept(packed, steps, spans, begin, to, cost, behind, ahead, most):
+    def kept(packed, steps, spans, begin, to, cost, behind, ahead, most, multipliers):
         assert spans.tolist() == np.diff(nodes).tolist()
+        assert multipliers is None
         found = cross_bends(packed, steps, spans, begin, to, cost, behind, ahead, most)
         seen.append((packed, (begin, to, cost, behind.copy()), most, found[0]))
         return found

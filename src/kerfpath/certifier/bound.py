@@ -9,8 +9,8 @@ from time import monotonic
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, scalar, short_repr
-from kerfpath.certificate import ALLOWANCE, Certificate, Stage
+from kerfpath.arrays import Array, Ints, not_negative, scalar, short_repr
+from kerfpath.certificate import LEAST_GAP, Certificate, Stage, allowance
 from kerfpath.certifier.cells import CellMaker, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.first_order import FirstOrder
@@ -26,6 +26,7 @@ from kerfpath.certifier.stages import (
     linked,
     solve_stage,
 )
+from kerfpath.certifier.tubes import Tubes
 from kerfpath.certifier.wide import thick, wide_bound
 from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -74,6 +75,12 @@ AT_LIMIT = 0.98
 EARLY, COARSE = 0.3, 1
 """Share of the work after which motions are always bounded in parts if (6) binds the plan; and the
 largest level of the new cells at further nodes."""
+FEW, PARTS = 16, 0.2
+"""Most layers between which motions are divided into tubes, and the share of the work that parts
+take before. A contour of no more nodes than `SEVERAL` has all of them as layers."""
+SEVERAL, HALF = 32, 0.5
+"""The same if a time is given, and the share of the time that parts take if there are more than
+`FEW`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,7 +161,7 @@ def certify(
     ----------
     plan : Plan
     gap : float
-        Value of (cost - bound) / cost at which it stops.
+        Value of (cost - bound) / cost at which it stops; `LEAST_GAP` if it is smaller.
     seconds : float s, optional
         Time after which no further stage is begun; default: a limit on the work, which does not
         depend on the machine, and an end where more work gains little.
@@ -171,9 +178,9 @@ def certify(
     Raises
     ------
     InputError
-        A gap or a time that is not positive.
+        A gap below 0, or a time that is not positive.
     """
-    gap = scalar(gap, "gap", above=0.0)
+    gap = max(not_negative(gap, "gap"), LEAST_GAP)
     until = np.inf
     if seconds is not None:
         until = monotonic() + scalar(seconds, "seconds", unit="s", above=0.0)
@@ -225,13 +232,13 @@ def _certified(
 
     `more` is what else it holds for, as `_also_for` says it.
     """
-    bound = max(best - ALLOWANCE * plan.cost, 0.0)
+    bound = max(best - allowance(gap, checkable=kept is not None) * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
     certificate = None if kept is None else Certificate(bound=bound, stages=kept)
     proof = replace(plan.proof, bound=bound, gap=reached, certificate=certificate)
     return Certified(
         plan=replace(plan, proof=proof),
-        done=reached <= gap,
+        done=reached <= gap * (1 + SAME_COST),
         statement=f"{proof.bound_claim}; {more}" if more else proof.bound_claim,
         stages=stages,
         pairs=pairs,
@@ -300,7 +307,7 @@ class _Certification:
             self.maker = cell_maker(plan, steps.weight, width, folded, floor)
         self.steps = replace(steps, endless=self.maker.endless)
         self.cost, self.until, self.progress = plan.cost, until, progress
-        self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
+        self.target = plan.cost * min(1.0, 1 - gap + allowance(gap, checkable=checkable))
         self.last = len(plan.q) - 1
         self.most_pairs = most
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
@@ -319,7 +326,13 @@ class _Certification:
         self.loose: tuple[int, StageResult] | None = None  # the best one left out, and its place
 
     def run(self) -> None:
-        """Run stages until the gap is reached or the work is spent."""
+        """Run stages, and divide motions, until the gap is reached or the work is spent."""
+        left = self._stages_until_stalled()
+        if left is not None and self.best < self.target and not self._spent(self.pairs):
+            self._divide(left)
+
+    def _stages_until_stalled(self) -> CellSet | None:
+        """Run stages; return the cells that are left if their motions are to be divided."""
         cells = self.maker.coarsest(self.nodes)
         self.at_node = len(cells) / len(self.nodes)
         cells = self.maker.certain(cells, self.steps.weight, UNCERTAIN * self.cost)
@@ -351,11 +364,12 @@ class _Certification:
             # Cells may be below the goal though the bound, the best of all layers, is not.
             reached = not low.any() or (not self.checkable and self.best >= self.goal)
             if not reached and fits and self._priced and (late or vain):
-                self._divide(cells.take(live))
-                return
+                return cells.take(live)
+            divisible = self._few and (self._patient or self._priced)
+            last = cells.take(live) if divisible else None
             if reached or len(cells) * left > MOST_CELLS or self._spent(ahead):
                 self._finish(result)
-                return
+                return last
             if fresh or not self.checkable or 1 - live.mean() > DROPPED:
                 self._keep(result)
                 fresh, kept = False, live
@@ -370,7 +384,7 @@ class _Certification:
                 cells = self._with_nodes(cells.take(kept))
             elif not which.any() or (vain and not self._patient):
                 self._finish(result)
-                return
+                return last
             elif fine and (lifted := self._unfold(cells.take(live), result.pairs)) is not None:
                 which = (lifted.floor < self.goal) & (lifted.grain < DEEPEST)
                 cells = self.maker.divided(lifted, which)
@@ -388,6 +402,13 @@ class _Certification:
         low = self.potential - (LOWER_NEW if fresh else LOWER) * self.cost
         worth = self.cost * (1 + self.margin)
         return solve_stage(cells, self.steps, care=care, worth=worth, low=low)
+
+    @cached_property
+    def _few(self) -> bool:
+        """Whether the layers are so few that motions are divided into tubes."""
+        other = self.checkable or self.maker.more or self.plan.feed is not None
+        most = SEVERAL if self._patient else FEW
+        return not other and self.last > 1 and len(self._layers) <= most
 
     @property
     def _patient(self) -> bool:
@@ -443,6 +464,8 @@ class _Certification:
     @cached_property
     def _layers(self) -> Ints:
         """Nodes on which (6) is used."""
+        if self.last < (SEVERAL if self._patient else FEW):
+            return np.arange(self.last + 1)
         return self.steps.layers(0, self.last)
 
     @cached_property
@@ -473,7 +496,7 @@ class _Certification:
         return limit_prices(u, slope, self.steps, np.diff(nodes), reach, most)
 
     def _divide(self, cells: CellSet) -> None:
-        """Continue at the layers of (6), with its multipliers, part by part."""
+        """Continue with multipliers of (6), part by part: in tubes, or at the layers of (6)."""
         self.nodes = self._layers
         cells = self._with_nodes(cells.take(np.isin(cells.node, self.nodes)), COARSE)
         before = self.pairs
@@ -483,6 +506,17 @@ class _Certification:
             self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
             return held > MOST_CELLS or self._spent(before + pairs)
 
+        begun = monotonic()
+
+        def enough_parts(pairs: int, held: int) -> bool:
+            if not self._few:
+                ended = False
+            elif len(self._layers) <= FEW:
+                ended = pairs > PARTS * self.most_pairs
+            else:
+                ended = monotonic() > begun + HALF * (self.until - begun)
+            return ended or enough(pairs, held)
+
         parts = Parts(
             self.maker,
             self.steps,
@@ -490,10 +524,26 @@ class _Certification:
             self.plan.gamma[self.nodes],
             cost=self.cost,
             target=self.target,
+            enough=enough_parts,
+        )
+        self._took(parts, parts.bound(cells, self.best))
+        if not self._few or self.best >= self.target or self._spent(self.pairs):
+            return
+        before = self.pairs
+        tubes = Tubes(
+            self.maker,
+            self.steps,
+            self.nodes,
+            cost=self.cost,
+            target=self.target,
             enough=enough,
         )
-        self.best = max(self.best, min(parts.bound(cells, self.best), self.cost))
-        self.pairs, self.count = before + parts.pairs, self.count + parts.count
+        self._took(tubes, min(tubes.bound(parts.left), self.target))
+
+    def _took(self, parts: Parts | Tubes, bound: float) -> None:
+        """Update bound and work with those of parts."""
+        self.best = max(self.best, min(bound, self.cost))
+        self.pairs, self.count = self.pairs + parts.pairs, self.count + parts.count
 
     def _keep(self, result: StageResult) -> None:
         """Add a stage to the certificate."""

@@ -317,6 +317,23 @@ class CellMaker:
         found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
         return found.center[:, posture], found.slope[:, posture], found.status[:, posture] > 0
 
+    def curves(
+        self, nodes: Ints, gamma: Array, half: Array, posture: Ints
+    ) -> tuple[Array, Array, Array, Array] | None:
+        """Return center, slope, bend and spread (M, n) on one interval of gamma at each node.
+
+        They are as in `CellSet`, on any turn. None if a posture (M,) has no solution on its
+        interval.
+        """
+        found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
+        each, h = (np.arange(len(nodes)), posture), half[:, None]
+        if not (found.status[each] > 0).all():
+            return None
+        low, high, slope = found.low[each], found.high[each], found.slope[each]
+        spread = found.radius[each] + self._width * (high - low) * h**2 / 4
+        spread = spread * (1 + ROUNDED) + ROUNDED * (1 + np.abs(slope) * h)
+        return found.center[each], slope, (low + high) / 2, spread
+
     def fits(self, course: Array) -> bool:
         """Return whether a course (K, n) rad is in the ranges on some turn, and above the floor.
 

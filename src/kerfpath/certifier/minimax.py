@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.arrays import Array
-from kerfpath.certificate import ALLOWANCE
+from kerfpath.certificate import allowance
 from kerfpath.certifier.cells import CellSet, cell_maker, foldable
 from kerfpath.certifier.parts import SAME_COST
 from kerfpath.certifier.stages import Steps, arranged, least_over_layers
@@ -52,7 +52,7 @@ def largest_step_bound(
         Returns whether the time is over, so that no further round begins.
     progress : Progress
     """
-    target = plan.cost * min(1.0, 1 - gap + ALLOWANCE + SAME_COST)
+    target = plan.cost * min(1.0, 1 - gap + allowance(gap, checkable=False) + SAME_COST)
     most_pairs = current_effort().minimax_pairs
     steps = _capped(steps, target)
     folded = foldable(plan.robot, steps.velocity)

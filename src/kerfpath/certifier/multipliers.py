@@ -69,7 +69,7 @@ def limit_prices(
     lengths = None
     if steps.metric != MANHATTAN:
         cost[:] = 0.0
-        lengths = _Lengths(sparse.diags_array(weight) @ moved, weight * own, n, steps.metric)
+        lengths = Lengths(sparse.diags_array(weight) @ moved, weight * own, n, steps.metric)
     linear = np.concatenate(
         [
             cost @ moved,
@@ -102,7 +102,7 @@ def _moved(slope: Array, n: int) -> _Rows:
     return sparse.csr_array((values, place), shape=(len(row), nodes))
 
 
-class _Lengths(NamedTuple):
+class Lengths(NamedTuple):
     """Weighted increments slope x + value, ((K-1) n,), and the metric that makes lengths of n."""
 
     slope: _Rows
@@ -134,7 +134,7 @@ class _Lengths(NamedTuple):
 
 
 def _dual(
-    groups: list[tuple[_Rows, Array, Array | float]], cost: Array, lengths: _Lengths | None
+    groups: list[tuple[_Rows, Array, Array | float]], cost: Array, lengths: Lengths | None
 ) -> Any:
     """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group, or None.
 

@@ -92,6 +92,7 @@ class Parts:
         self._number, self._held = count(), 0
         self._open: list[tuple[float, int, _Part]] = []
         self._closed = cost
+        self._stuck: list[tuple[float, CellSet]] = []
         self.pairs, self.count = 0, 0
 
     def bound(self, cells: CellSet, known: float) -> float:
@@ -107,6 +108,11 @@ class Parts:
             self._held -= len(part.cells)
             self._divide(part, known)
         return min(self._closed, self._open[0][0]) if self._open else self._closed
+
+    @property
+    def left(self) -> list[tuple[float, CellSet]]:
+        """The parts whose bounds do not reach the target, each with its bound."""
+        return [*self._stuck, *((known, part.cells) for known, _, part in self._open)]
 
     def _wait(self, known: float, part: _Part) -> None:
         heappush(self._open, (known, next(self._number), part))
@@ -132,6 +138,8 @@ class Parts:
             smaller = [] if least >= self._target else self._smaller(left)
             if not smaller:
                 self._closed = min(self._closed, least)
+                if least < self._target:
+                    self._stuck.append((least, rest))
             for each in smaller:
                 self._wait(least, each)
 

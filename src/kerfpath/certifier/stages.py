@@ -137,7 +137,7 @@ class Steps:
 
 def cross_bends(
     packed: Cells, steps: Steps, spans: Ints, begin: Ints, to: Ints, cost: Array,
-    behind: Array, ahead: Array, most: float,
+    behind: Array, ahead: Array, most: float, multipliers: Array | None = None,
 ) -> tuple[Array, int]:  # fmt: skip
     """Return the least cost through each cell (C,), infinite beyond `most`; and the tests of (6).
 
@@ -154,8 +154,12 @@ def cross_bends(
         Least reduced cost up to each cell and from it on, without (6).
     most : float
         Largest cost of the motions of interest.
+    multipliers : (M, n), optional
+        Multipliers of (6) that the reduced costs contain. A pair of steps costs more by what it
+        leaves of their price unused.
     """
     start, step = packed.start, steps.over(1)
+    nu, price = _unused_of(steps, spans, multipliers)
     lead = np.argmax(np.abs(packed.slope) / steps.bend(1, 1).bound, axis=1)
     bends = [steps.bend(*pair) for pair in pairwise(spans.tolist())]
     origin = np.repeat(np.arange(len(behind)), np.diff(begin))
@@ -173,7 +177,7 @@ def cross_bends(
         in_begin = np.searchsorted(to[ending], np.arange(first, last + 1))
         tests += cross_on(
             packed, step, bends[k - 1], lead, first, last, begin, to, origin, ending, in_begin,
-            cost, ahead, most, until,
+            cost, ahead, most, nu[k], float(price[k]), until,
         )  # fmt: skip
     onward[edges[-1]] = 0.0
     for k in range(layers - 2, 0, -1):
@@ -187,13 +191,22 @@ def cross_bends(
         ending = np.arange(edges[k - 1].start, edges[k - 1].stop)
         tests += cross_back(
             packed, step, bends[k - 1], lead, first, last, to, origin, leaving, on_begin,
-            ending[np.isfinite(until[ending])], cost, until, most, onward,
+            ending[np.isfinite(until[ending])], cost, until, most, nu[k], float(price[k]), onward,
         )  # fmt: skip
     through = np.full(len(behind), np.inf)
     whole = until + onward
     np.minimum.at(through, origin, whole)
     np.minimum.at(through, to[edges[-1]], until[edges[-1]])
     return through, tests
+
+
+def _unused_of(steps: Steps, spans: Ints, multipliers: Array | None) -> tuple[Array, Array]:
+    """Return multipliers (M, n) and the most that they add at each layer (M,), rounded down."""
+    M = len(spans) + 1
+    if multipliers is None:
+        return np.zeros((M, len(steps.weight))), np.zeros(M)
+    apart = np.pad((spans[:-1] + spans[1:]) / 2, 1)
+    return multipliers, apart * (np.abs(multipliers) @ steps.acceleration) * (1 - ROUNDED)
 
 
 # -----------------------------------------------------------------------------
@@ -343,7 +356,7 @@ def solve_stage(
     tests = 0
     if most is not None and len(start) > 2 and np.isfinite(through).any():
         through, tests = cross_bends(
-            packed, steps, spans, begin, to, cost, behind, ahead, most + price
+            packed, steps, spans, begin, to, cost, behind, ahead, most + price, multipliers
         )
     through -= price
     finite = np.isfinite(through)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
-from kerfpath.certificate import ALLOWANCE, cell_bounds
+from kerfpath.certificate import allowance, cell_bounds
 from kerfpath.certifier.cells import MORE_CELLS, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.motion_slopes import motion_slopes
@@ -91,7 +91,7 @@ def wide_bound(
         Takes the number of steps after the next stage; returns whether the work is over.
     progress : Progress
     """
-    target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
+    target = plan.cost * min(1.0, 1 - gap + allowance(gap, checkable=False))
     maker = cell_maker(plan, steps.weight, folded=foldable(plan.robot, steps.velocity))
     # Motions in which a joint moves farther between any two nodes cost more than the plan.
     alone: Array = np.divide(

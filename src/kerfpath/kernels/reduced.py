@@ -32,6 +32,7 @@ __all__ = [
     "Step",
     "beyond",
     "drift",
+    "excess",
     "lean",
     "least_ahead",
     "near",
@@ -180,6 +181,12 @@ def beyond(y: Array, step: Step) -> float:
         norm = sqrt(norm)
     share = max(0.0, 1.0 - 1.0 / norm) if norm > 0 else 0.0
     return size * (share + SLACK) + free * (1.0 + SLACK)
+
+
+@jit
+def excess(y: Array, step: Step) -> float:
+    """Return what `beyond` does, for callers outside the kernels."""
+    return beyond(y, step)
 
 
 @jit_inline

@@ -601,9 +601,12 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
         ("refine_parts = 0", "refine_parts: expected a whole number from 1 to 100, got 0"),
         ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
         ("certify = 1", "plan.certify: expected true or false, got 1"),
-        ("certify_gap_percent = 0", "expected a number above 0, at most 100, in per cent, got 0"),
+        (
+            "certify_gap_percent = -1",
+            "expected a number not below 0, at most 100, in per cent, got -1",
+        ),
         ("certify_gap_percent = 101", "at most 100, in per cent, got 101"),
-        ("certify_gap_percent = nan", "plan.certify_gap_percent: expected a number above 0"),
+        ("certify_gap_percent = nan", "plan.certify_gap_percent: expected a number not below 0"),
         ("certify_seconds = -1", "plan.certify_seconds: expected a number above 0, in s, got -1"),
         ("certify_seconds = inf", "plan.certify_seconds: expected a number above 0, in s, got inf"),
         (
@@ -637,6 +640,7 @@ def test_what_is_certified_is_read_from_four_keys(read):
     keys = "certify_gap_percent = 2\ncertify_seconds = 3\ncertificate = true"
     assert certify(keys) == Certify(gap=0.02, seconds=3.0, keep=True)
     assert certify("certify = true\ncertify_gap_percent = 100") == Certify(gap=1.0)
+    assert certify("certify_gap_percent = 0") == Certify(gap=0.0)
 
 
 def test_a_rotation_limit_is_one_for_every_endless_axis(read):

@@ -1,0 +1,449 @@
+"""Branch and bound over tubes: motions whose gamma stays in one interval at each node.
+
+Three bounds hold for the motions of a tube. The first is a linear (or second-order cone) program in
+the squares, too: with q_k = c_k + s_k t + b_k t^2 / 2 +- r_k on the interval of node k, the pair
+(t, t^2) is replaced by (t, w) in the convex hull of the parabola, so that (5), (6) and the cost
+become convex. Its duals y of the increments and nu of (6) give a bound that is proved by itself,
+whatever they are (`_Tube.least`): a sum of minima of one quadratic function at each node. The other
+two are stages on the cells of the tube, with nu of the whole tube and of its part around the motion
+that the program found; they rule out cells. The joints on an interval of half-width h differ from
+the convex hull by no more than a multiple of h^2, so that the first bound closes as tubes get
+narrower. Where a program has no solution, its duals prove that the tube has no motion.
+
+The tube with the lowest bound is divided first: at the node where the program is the farthest from
+the parabola.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from itertools import count
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.certificate import cell_bounds
+from kerfpath.certifier.cells import FREE, TURN, CellMaker, CellSet
+from kerfpath.certifier.multipliers import Lengths
+from kerfpath.certifier.parts import CARE, SAME_COST
+from kerfpath.certifier.stages import ROUNDED, StageResult, Steps, distinct_groups, solve_stage
+from kerfpath.conic import ConicSolution, NonnegativeConeT, minimise
+from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.reduced import excess
+
+ACROSS = 16
+"""Cells of a node below which all of them are halved."""
+DEEPEST = 18
+"""Largest level: cells of 2e-5 deg."""
+WIDEST = 0.5
+"""rad: largest half-width of an interval for which a program is solved."""
+TRUST, WIDER, TIMES = 0.017, 2.0, 5
+"""rad: how far from the motion of the program its part goes for which multipliers are made; and the
+factor by which it is widened, and how often, where it has no motion."""
+TANGENTS = -1.0, -0.6, -0.25, 0.25, 0.6, 1.0
+"""Where on the parabola, in half-widths, the squares are held from below."""
+AGAIN, ROUNDS = 0.8, 4
+"""Share of its cells that a tube must lose to be bounded again, undivided, and how often."""
+PROGRAM_PAIRS = 400
+"""Number of steps from cell to cell that take as long as a program, for each of its nodes."""
+UNIT = 2.0**-52
+"""Relative spacing of floating-point numbers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Tube:
+    """Curves of the joints on one interval of gamma at each of M layers.
+
+    Parameters
+    ----------
+    middle, half : (M,) rad
+    center, slope, bend, spread : (M, n)
+        As in `CellSet`; the increments are those of the centres.
+    """
+
+    middle: Array
+    half: Array
+    center: Array
+    slope: Array
+    bend: Array
+    spread: Array
+
+    __repr__ = short_repr
+
+    def least(self, steps: Steps, spans: Ints, y: Array, nu: Array) -> float:
+        """Return a lower bound on the cost of the motions of the tube, from any duals.
+
+        Parameters
+        ----------
+        steps : Steps
+        spans : (M - 1,)
+        y : (M - 1, n)
+            Slopes of the cost, tilt included, by the increments.
+        nu : (M, n)
+            Multipliers of (6).
+        """
+        over = sum(excess(y[k], steps.tilted(nu, spans, k)) for k in range(len(y)))
+        force = -np.diff(y, axis=0, prepend=0.0, append=0.0)
+        h, size = self.half, np.abs(force)
+        level = (force * self.center).sum(axis=1)
+        slope, bend = (force * self.slope).sum(axis=1), (force * self.bend).sum(axis=1)
+        ends = bend * h**2 / 2 - np.abs(slope) * h
+        inside = np.abs(slope) < bend * h
+        lowest = np.where(inside, -(slope**2) / (2 * np.where(inside, bend, 1.0)), ends)
+        price = steps.price(nu, spans)
+        total = float((level + lowest - (size * self.spread).sum(axis=1)).sum() - over - price)
+        sizes = np.abs(self.center) + np.abs(self.slope) * h[:, None]
+        sizes += np.abs(self.bend) * h[:, None] ** 2 + self.spread
+        rounded = 4 * UNIT * force.size * (float((size * sizes).sum()) + over + price)
+        return total - rounded
+
+    def pull(self, y: Array) -> Array:
+        """Return how much the squares of gamma matter at each layer (M,), with duals y."""
+        force = -np.diff(y, axis=0, prepend=0.0, append=0.0)
+        return np.asarray(np.abs((force * self.bend).sum(axis=1)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Found:
+    """What a program found: gamma (M,), squares less those of gamma (M,), and duals.
+
+    Without a solution there are duals only, which may prove that there is none.
+    """
+
+    solved: bool
+    y: Array
+    nu: Array
+    gamma: Array
+    beyond: Array
+
+    __repr__ = short_repr
+
+
+class _Program:
+    """The convex program of tubes at given layers."""
+
+    def __init__(self, steps: Steps, nodes: Ints) -> None:
+        self._steps, self.spans = steps, np.diff(nodes)
+        M, n = len(nodes), len(steps.weight)
+        edges, size = M - 1, (M - 1) * n
+        manhattan = steps.metric == MANHATTAN
+        lengths = size if manhattan else edges
+        first = 2 * M + size
+        self._size, self._count = (M, n), first + lengths
+        eye = sparse.eye_array(self._count, format="csr")
+        t, w, u, r = eye[:M], eye[M : 2 * M], eye[2 * M : first], eye[first:]
+        self._link = u
+        each = np.repeat(self.spans.astype(float), n)
+        mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ u)
+        bent, apart = mean[n:] - mean[:-n], (self.spans[:-1] + self.spans[1:]) / 2
+        change = np.outer(apart, steps.acceleration).ravel()
+        velocity = np.concatenate([steps.over(int(m)).velocity for m in self.spans])
+        moved = sparse.diags_array(np.tile(steps.weight, edges)) @ u
+        one, zero = np.ones(M), np.zeros(M)
+        rows: list[Any] = [bent, -bent, u, -u, t, -t, w, -w]
+        right = [change, change, velocity, velocity, one, one, one, zero]
+        for at in TANGENTS:
+            rows.append(2 * at * t - w)
+            right.append(at * at * one)
+        if manhattan:
+            rows += [moved - r, -moved - r]
+            right += [np.zeros(size)] * 2
+        held = sum(len(bound) for bound in right)
+        self._cones = [NonnegativeConeT(2 * size + held)]
+        if not manhattan:
+            longer, bound, cones = Lengths(moved, np.zeros(size), n, steps.metric).cones(
+                first, self._count
+            )
+            rows.append(longer)
+            right.append(bound)
+            self._cones += cones
+        self._rows = sparse.csr_array(sparse.vstack(rows))
+        self._right = np.concatenate(right)
+        self._cost = np.concatenate([np.zeros(first), np.ones(lengths)])
+        k, i = np.divmod(np.arange(size), n)
+        self._place = np.tile(np.arange(size), 4), np.concatenate([k + 1, k, M + k + 1, M + k])
+        self._at = k, i
+
+    def solve(self, tube: _Tube) -> _Found | None:
+        """Return what the program of a tube finds; None if the solver fails."""
+        M, n = self._size
+        k, i = self._at
+        linear, square = tube.slope * tube.half[:, None], tube.bend * tube.half[:, None] ** 2 / 2
+        values = [linear[k + 1, i], -linear[k, i], square[k + 1, i], -square[k, i]]
+        size = len(k)
+        moved = sparse.csr_array((np.concatenate(values), self._place), (size, self._count))
+        link = moved - self._link
+        D, wide = np.diff(tube.center, axis=0).ravel(), (tube.spread[1:] + tube.spread[:-1]).ravel()
+        rows = sparse.vstack([link, -link, self._rows])
+        bounds = np.concatenate([wide - D, wide + D, self._right])
+        found: ConicSolution = minimise(self._cost, rows, bounds, self._cones, threads=1)
+        if not np.isfinite(found.dual).all():
+            return None
+        duals = found.dual
+        y = (duals[:size] - duals[size : 2 * size]).reshape(M - 1, n)
+        above = duals[2 * size :][: 2 * (size - n)].reshape(2, M - 2, n)
+        nu = np.pad(above[0] - above[1], ((1, 1), (0, 0)))
+        t, w = found.x[:M], found.x[M : 2 * M]
+        return _Found(
+            solved=found.solved and bool(np.isfinite(t).all()),
+            y=y,
+            nu=nu,
+            gamma=tube.middle + tube.half * np.clip(t, -1.0, 1.0),
+            beyond=np.maximum(w - t * t, 0.0) * tube.half**2,
+        )
+
+
+@dataclass(slots=True, eq=False)
+class _Part:
+    """Cells of a tube, or of several, and how often it was bounded undivided."""
+
+    cells: CellSet
+    rounds: int = 0
+
+    __repr__ = short_repr
+
+
+class Tubes:
+    """Divides motions into tubes, those that may be the cheapest first, and bounds each.
+
+    Parameters
+    ----------
+    maker : CellMaker
+        Of cells of gamma alone.
+    steps : Steps
+    nodes : (M,)
+        The layers.
+    cost, target : float
+        Cost of the plan, and the bound to reach.
+    enough : callable
+        Takes the number of steps bounded and of cells held; returns whether to stop.
+    """
+
+    def __init__(
+        self,
+        maker: CellMaker,
+        steps: Steps,
+        nodes: Ints,
+        *,
+        cost: float,
+        target: float,
+        enough: Callable[[int, int], bool],
+    ) -> None:
+        self._maker, self._steps, self._nodes = maker, steps, nodes
+        self._program = _Program(steps, nodes)
+        self._free = replace(steps, weight=np.zeros_like(steps.weight))
+        self._cost, self._target, self._enough = cost, target, enough
+        self._number, self._held = count(), 0
+        self._open: list[tuple[float, int, _Part]] = []
+        self._closed = cost
+        self.pairs, self.count = 0, 0
+
+    def bound(self, sets: Sequence[tuple[float, CellSet]]) -> float:
+        """Return a lower bound on the cost of motions through cells, at most the plan's cost.
+
+        Each of the sets is a known lower bound, and cells of the layers.
+        """
+        for known, cells in sets:
+            self._wait(known, _Part(cells))
+        while self._open and self._open[0][0] < min(self._target, self._closed):
+            if self._enough(self.pairs, self._held):
+                break
+            known, _, part = heappop(self._open)
+            self._held -= len(part.cells)
+            self._divide(part, known)
+        return min(self._closed, self._open[0][0]) if self._open else self._closed
+
+    def _wait(self, known: float, part: _Part) -> None:
+        heappush(self._open, (known, next(self._number), part))
+        self._held += len(part.cells)
+
+    def _divide(self, part: _Part, known: float) -> None:
+        """Bound a tube, and queue what is left of it, in parts, if it may cost less."""
+        self.count += 1
+        cells = self._finer(part.cells)
+        if len(np.unique(cells.node)) < len(self._nodes):
+            return
+        low, high = self._hull(cells)
+        tube, found = self._tube(cells, low, high), None
+        if tube is not None:
+            found = self._solved(tube)
+        if tube is not None and found is not None:
+            if not found.solved:
+                if tube.least(self._free, self._program.spans, found.y, found.nu) > 0:
+                    return
+                found = None
+            else:
+                own = tube.least(self._steps, self._program.spans, found.y, found.nu)
+                known = max(known, own)
+                if self._close(known):
+                    return
+        results = self._stages(cells, low, high, tube, found)
+        through = np.maximum.reduce([results[0].cells.floor, *(each.through for each in results)])
+        cells = replace(results[0].cells, floor=through)
+        kept = through <= self._cost * (1 + SAME_COST)
+        if not kept.any():
+            return
+        lost = 1 - float(kept.mean()) > 1 - AGAIN
+        for one in distinct_groups(results[0], kept, self._maker):
+            rest = cells.take(one)
+            present = np.unique(rest.node)
+            if len(present) < len(self._nodes):
+                continue  # no motion along the whole contour
+            least = max(known, _least(rest))
+            if self._close(least):
+                continue
+            if lost and part.rounds < ROUNDS:
+                self._wait(least, _Part(rest, part.rounds + 1))
+                continue
+            halves = self._halves(rest, tube, found)
+            if not halves:
+                self._closed = min(self._closed, least)
+            for each in halves:
+                self._wait(least, _Part(each))
+
+    def _close(self, known: float) -> bool:
+        """Return whether the bound of a tube suffices, so that it need not be divided."""
+        if known < self._target:
+            return False
+        self._closed = min(self._closed, known)
+        return True
+
+    def _finer(self, cells: CellSet) -> CellSet:
+        """Return the cells, halved where a node has few."""
+        while True:
+            few = np.bincount(cells.node, minlength=int(self._nodes[-1]) + 1) < ACROSS
+            which = few[cells.node] & (cells.level < DEEPEST)
+            if not which.any():
+                return cells
+            cells = self._maker.divided(cells, which)
+
+    def _hull(self, cells: CellSet) -> tuple[Array, Array]:
+        """Return the ends (M,) of the shortest interval of gamma that holds the cells of a node."""
+        middle, half = cell_bounds(cells.level, cells.index)
+        order = np.lexsort((middle, cells.node))
+        low, high = np.empty((2, len(self._nodes)))
+        begin = np.searchsorted(cells.node[order], self._nodes)
+        last = 0.0
+        for k, which in enumerate(np.split(order, begin[1:])):
+            at, wide = middle[which], half[which]
+            gap = int(np.argmax(np.diff(at, append=at[0] + TURN))) + 1
+            at, wide = np.roll(at, -gap), np.roll(wide, -gap)
+            at = at[0] + np.mod(at - at[0], TURN)
+            turn = TURN * np.rint((last - at.mean()) / TURN)
+            low[k], high[k] = (at - wide).min() + turn, (at + wide).max() + turn
+            last = (low[k] + high[k]) / 2
+        return low, high
+
+    def _tube(self, cells: CellSet, low: Array, high: Array) -> _Tube | None:
+        """Return the curves on the hull of cells, or on a part of it.
+
+        None if they do not have certain increments: too wide, or in several postures or turns.
+        """
+        half = (high - low) / 2 * (1 + ROUNDED) + ROUNDED * (1 + np.abs(low))
+        if half.max() > WIDEST:
+            return None
+        layer = np.searchsorted(self._nodes, cells.node)
+        posture = np.zeros(len(self._nodes), np.int64)
+        posture[layer] = cells.posture
+        if (cells.posture != posture[layer]).any() or (cells.box > FREE).any():
+            return None
+        middle = (low + high) / 2
+        found = self._maker.curves(self._nodes, middle, half, posture)
+        if found is None:
+            return None
+        center, slope, bend, spread = found
+        box = np.abs(slope) * half[:, None] + np.abs(bend) * half[:, None] ** 2 / 2 + spread
+        if (box > FREE).any():
+            return None
+        ended = ~self._steps.endless
+        turn = np.rint((cells.center - center[layer]) / TURN)
+        own = np.zeros_like(center)
+        own[layer] = turn
+        if (turn != own[layer])[:, ended].any():
+            return None
+        center = center + TURN * np.where(ended, own, 0.0)
+        D = np.diff(center, axis=0)
+        short = TURN * np.rint(D / TURN)
+        wide = np.abs(D - short) + box[1:] + box[:-1]
+        if (wide > np.pi)[:, ~ended].any():
+            return None
+        center[1:] -= np.cumsum(np.where(ended, 0.0, short), axis=0)
+        return _Tube(
+            middle=middle,
+            half=half,
+            center=center,
+            slope=slope,
+            bend=bend,
+            spread=spread + ROUNDED * (1 + np.abs(center)),
+        )
+
+    def _solved(self, tube: _Tube) -> _Found | None:
+        self.pairs += PROGRAM_PAIRS * len(self._nodes)
+        return self._program.solve(tube)
+
+    def _stages(
+        self, cells: CellSet, low: Array, high: Array, tube: _Tube | None, found: _Found | None
+    ) -> list[StageResult]:
+        """Return stages on the cells, with the duals of the tube and of a part of it."""
+        if tube is None or found is None:
+            return [self._stage(cells, None, None)]
+        duals = [found]
+        about, reach = found.gamma, TRUST
+        for _ in range(TIMES):
+            if reach >= tube.half.max():
+                break
+            part = self._tube(
+                cells, np.maximum(low, about - reach), np.minimum(high, about + reach)
+            )
+            near = None if part is None else self._solved(part)
+            if near is not None and near.solved:
+                duals.insert(0, near)
+                break
+            reach *= WIDER
+        results: list[StageResult] = []
+        for each in duals:
+            results.append(self._stage(cells, each.nu, each.y))
+            if results[-1].bound >= self._target:
+                break
+        return results
+
+    def _stage(self, cells: CellSet, nu: Array | None, y: Array | None) -> StageResult:
+        most = self._cost * (1 + SAME_COST)
+        given = None if y is None else np.ascontiguousarray(y[:, None])
+        result = solve_stage(cells, self._steps, nu, care=CARE * self._cost, most=most, given=given)
+        self.pairs += result.pairs
+        return result
+
+    def _halves(self, cells: CellSet, tube: _Tube | None, found: _Found | None) -> list[CellSet]:
+        """Return the cells on either side of the middle of a node, or none if it has one alone."""
+        layer = np.searchsorted(self._nodes, cells.node)
+        for k in range(len(self._nodes)):
+            here = layer == k
+            postures = np.unique(cells.posture[here])
+            if len(postures) > 1:
+                return [cells.take(~here | (cells.posture == p)) for p in postures]
+        low, high = self._hull(cells)
+        middle, _ = cell_bounds(cells.level, cells.index)
+        off = middle - ((low + high) / 2)[layer]
+        off -= TURN * np.rint(off / TURN)
+        left = off <= 0
+        several = np.bincount(layer[left], minlength=len(low)) > 0
+        several &= np.bincount(layer[~left], minlength=len(low)) > 0
+        if not several.any():
+            return []
+        score = (high - low) ** 2
+        if tube is not None and found is not None:
+            pull = tube.pull(found.y)
+            score = score * (pull + 1e-3 * pull.max() + 1e-9)
+        k = int(np.argmax(np.where(several, score, -1.0)))
+        return [cells.take((layer != k) | side) for side in (left, ~left)]
+
+
+def _least(cells: CellSet) -> float:
+    """Return the least floor of the cells of a node, at the node where it is largest."""
+    begin = np.flatnonzero(np.diff(cells.node, prepend=-1))
+    return float(np.minimum.reduceat(cells.floor, begin).max())
