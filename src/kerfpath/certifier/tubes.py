@@ -300,7 +300,9 @@ class Tubes:
                 self._wait(least, _Part(rest, part.rounds + 1))
                 continue
             halves = self._halves(rest, tube, found)
-            if not halves:
+            if not halves and (rest.level < DEEPEST).any():
+                halves = [rest]  # one cell at each node, which is halved next time
+            elif not halves:
                 self._closed = min(self._closed, least)
             for each in halves:
                 self._wait(least, _Part(each))
