@@ -199,10 +199,11 @@ class _Program:
 
 @dataclass(slots=True, eq=False)
 class _Part:
-    """Cells of a tube, or of several, and how often it was bounded undivided."""
+    """Cells of a tube, or of several, how often it was bounded undivided, and known duals."""
 
     cells: CellSet
     rounds: int = 0
+    duals: _Found | None = None
 
     __repr__ = short_repr
 
@@ -281,7 +282,8 @@ class Tubes:
                 known = max(known, own)
                 if self._close(known):
                     return
-        results = self._stages(cells, low, high, tube, found)
+        duals = found or part.duals  # those of the tube that it is a part of
+        results = self._stages(cells, low, high, tube, duals)
         through = np.maximum.reduce([results[0].cells.floor, *(each.through for each in results)])
         cells = replace(results[0].cells, floor=through)
         kept = through <= self._cost * (1 + SAME_COST)
@@ -297,7 +299,7 @@ class Tubes:
             if self._close(least):
                 continue
             if lost and part.rounds < ROUNDS:
-                self._wait(least, _Part(rest, part.rounds + 1))
+                self._wait(least, _Part(rest, part.rounds + 1, duals))
                 continue
             halves = self._halves(rest, tube, found)
             if not halves and (rest.level < DEEPEST).any():
@@ -305,7 +307,7 @@ class Tubes:
             elif not halves:
                 self._closed = min(self._closed, least)
             for each in halves:
-                self._wait(least, _Part(each))
+                self._wait(least, _Part(each, duals=duals))
 
     def _close(self, known: float) -> bool:
         """Return whether the bound of a tube suffices, so that it need not be divided."""
