@@ -186,6 +186,9 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
 # -----------------------------------------------------------------------------
 # Plan the whole part.
 
+TURNED, SHORTER = 2, 1e-3
+"""How often chosen candidates are turned towards their neighbours at most, and the relative time
+that it must save to be done again."""
 LONGER = 1e-3
 """Relative extra time up to which an order is kept although the final form of its candidates is not
 the one that it was found with."""
@@ -662,8 +665,12 @@ def order_candidates(
         )
 
     found = ordered()
-    if offered.turn_between(found, may_turn):
-        found = ordered()
+    for _ in range(TURNED):
+        if not offered.turn_between(found, may_turn):
+            break
+        took, found = found.order.duration, ordered()
+        if found.order.duration > (1 - SHORTER) * took:
+            break
     while (settled := offered.settle(found)) is None:
         found = ordered()
     found = settled
