@@ -208,8 +208,9 @@ def test_taught_targets_are_kept_and_the_rest_is_planned_again(folder):
     assert list(after) == list(before)  # the order of cutting
     for name, was in before.items():
         assert set(after[name].posture) == set(was.posture)
-    for name in ("joined", "cornered"):
-        np.testing.assert_allclose(after[name].q, before[name].q, atol=1e-9)
+    for name in ("joined", "cornered"):  # as drawn, perhaps turned about the beam by up to 1 % more
+        np.testing.assert_allclose(after[name].points, before[name].points, atol=1e-9)
+        assert after[name].cost == pytest.approx(before[name].cost, rel=0.01)
     assert run("audit", folder / "one/plan.json").returncode == 0
 
 
