@@ -82,7 +82,7 @@ def run(*, quick: bool = False) -> Report:
         cases = _cases(Path(folder), quick=quick)
         known = [_both(case, figures, findings) for case in cases]
         first = cases[0]
-        contours = contours_of(**job_key(first.job), goal=first.goal)
+        contours = contours_of(**job_key(first.job))
         figures += _bounds(known[0], contours, 1 if quick else 4)
     return Report(title="Layout", how=HOW, figures=figures, findings=findings)
 

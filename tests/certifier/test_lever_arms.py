@@ -12,7 +12,7 @@ from kerfpath.certifier import certify
 from kerfpath.certifier.bound import _steps_of
 from kerfpath.certifier.lever_arms import _lever_arms, _turning, lever_bounds
 from kerfpath.plans import Proof
-from kerfpath.robots import Arm, Robot, RobotLimits
+from kerfpath.robots import Arm, Robot, RobotLimits, chain_of
 from kerfpath.urdf import KinematicChain
 
 TRAVEL = {"lower": -1.0, "upper": 1.0, "velocity": 1.0, "acceleration": 5.0}
@@ -123,7 +123,9 @@ def test_it_is_the_least_cost_that_the_lever_arms_allow():
     """The tip alone: with one row the dual is exact, against a linear program for each step."""
     made = motion(ARMS["seven"], 1)
     steps = _steps_of(made)
-    arms, turning = _lever_arms(made, steps, 0.0), _turning(made)
+    chain = chain_of(made.robot)
+    tool = chain.end @ made.T_flange_tip
+    arms, turning = _lever_arms(made, steps, chain, tool, 0.0), _turning(chain, tool)
     least = lever_bounds(made, steps)
     moved = np.linalg.norm(np.diff(made.contour.points, axis=0), axis=1)
     for k in range(0, NODES - 1, 7):

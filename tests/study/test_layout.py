@@ -61,7 +61,7 @@ def in_cell(tmp_path_factory):
 
 
 def middle(path, goal="speed"):
-    return middle_of(read_job(path), nodes_of(contours_of(**job_key(path), goal=goal)))
+    return middle_of(read_job(path), nodes_of(contours_of(**job_key(path))))
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def middle(path, goal="speed"):
 def test_no_bound_is_below_what_the_exact_search_finds(which, goal, request):
     job = request.getfixturevalue(which)
     rng = np.random.default_rng(3)
-    sizes = [len(s.nodes) for s in contours_of(**job_key(job), goal=goal)]
+    sizes = [len(s.nodes) for s in contours_of(**job_key(job))]
     decided = 0
     for offsets in SOME:
         stretches = []
@@ -104,7 +104,7 @@ def test_the_bounds_are_near_the_value_where_the_stretch_is_the_one_that_binds(p
 
 def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
     job, lost = read_job(plain), 0
-    subjects = {s.name: s for s in contours_of(**job_key(plain), goal="speed")}
+    subjects = {s.name: s for s in contours_of(**job_key(plain))}
     for x in (300.0, 600.0, 800.0, 1000.0):
         answer = worth(plain, {"x_mm": x})
         if answer.status != "unreachable":

@@ -45,13 +45,13 @@ def coarse(tmp_path_factory):
 
 def moved(path, offsets, goal="speed"):
     """Return the job with a placement, and its contours."""
-    job, nodes = read_job(path), contours_of(**job_key(path), goal=goal)
+    job, nodes = read_job(path), contours_of(**job_key(path))
     return move_job(job, numbers_of(job, offsets, middle_of(job, nodes_of(nodes)))), nodes
 
 
 def whole(path, goal="speed"):
     """Return the stretches that are all of each contour."""
-    sampled = contours_of(**job_key(path), goal=goal)
+    sampled = contours_of(**job_key(path))
     return [(c, 0, len(contour.nodes) - 1) for c, contour in enumerate(sampled)]
 
 

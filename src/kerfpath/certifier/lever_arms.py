@@ -22,6 +22,7 @@ from kerfpath.certifier.stages import Steps
 from kerfpath.kernels.metric import CHEBYCHEV, EUCLID
 from kerfpath.plans import Plan
 from kerfpath.robots import chain_of
+from kerfpath.urdf import KinematicChain
 
 PARTS = 12
 """Shares that are tried are multiples of one over this; each of them gives a bound."""
@@ -29,16 +30,17 @@ PARTS = 12
 
 def lever_bounds(plan: Plan, steps: Steps) -> Array:
     """Return the least cost (K - 1,) of each step of any motion along the contour of a plan."""
-    tool = chain_of(plan.robot).end @ plan.T_flange_tip
+    chain = chain_of(plan.robot)
+    tool = chain.end @ plan.T_flange_tip
     backs = [0.0, float(-tool[:3, 3] @ tool[:3, 2])]  # the tip; what is nearest to the last joint
     points, axes = plan.contour.points, plan.contour.axes
     crossed = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=1)
     turned = np.arctan2(crossed, (axes[:-1] * axes[1:]).sum(axis=1))
     if plan.settings.tilt is not None:  # with an axis that is not known
         turned, backs = np.maximum(turned - 2 * plan.settings.tilt.cone, 0.0), backs[:1]
-    moved, arms = [turned], [np.tile(_turning(plan), (len(turned), 1))]
+    moved, arms = [turned], [np.tile(_turning(chain, tool), (len(turned), 1))]
     for back in backs:
-        lever = _lever_arms(plan, steps, back)
+        lever = _lever_arms(plan, steps, chain, tool, back)
         longest = lever.max(axis=1)
         way = np.linalg.norm(np.diff(points + back * axes, axis=0), axis=1)
         moved.append(way / longest)
@@ -52,33 +54,31 @@ def lever_bounds(plan: Plan, steps: Steps) -> Array:
     return best
 
 
-def _turning(plan: Plan) -> Array:
-    """Return by how much each joint (n,) turns the tool axis at most, as a share of its turn."""
-    chain = chain_of(plan.robot)
+def _turning(chain: KinematicChain, tool: Array) -> Array:
+    """Return by how much each joint (n,) turns the tool axis at most, as a share of its turn.
+
+    `tool` is the pose (4, 4) m of the tip in the frame of the last joint.
+    """
     turning = np.empty(chain.joints)
     turning[chain.order] = ~chain.slides
-    axis = (chain.end @ plan.T_flange_tip)[:3, 2]
-    turning[len(chain.axes) - 1] = np.linalg.norm(np.cross(chain.axes[-1], axis))
+    turning[len(chain.axes) - 1] = np.linalg.norm(np.cross(chain.axes[-1], tool[:3, 2]))
     return turning
 
 
-def _lever_arms(plan: Plan, steps: Steps, back: float) -> Array:
+def _lever_arms(plan: Plan, steps: Steps, chain: KinematicChain, tool: Array, back: float) -> Array:
     """Return bounds (K - 1, n) m on the lever arms of a point of the tool axis, beyond the tip.
 
     They hold all along a straight motion of the joints from node to node; such a motion need not be
     run, the argument takes it. On it the point leaves its chord by no more than an eighth of the
     longest lever arm times the square of what all joints turn.
     """
-    chain = chain_of(plan.robot)
-    tool = chain.end @ plan.T_flange_tip
     arms = np.empty(chain.joints)
     arms[chain.order] = chain.reach(chain.joints, (tool[:3, 3] + back * tool[:3, 2])[None])
     every = np.tile(arms, (len(plan.q) - 1, 1))
     if plan.robot.externals:
         return every
     # Axis 1 stands still and axis 2 goes round it, so the path says how far the point is from them.
-    on_path = plan.contour.points + back * plan.contour.axes
-    points = on_path @ plan.T_base_part[:3, :3].T + plan.T_base_part[:3, 3]
+    points = plan.points + (back * plan.contour.axes) @ plan.T_base_part[:3, :3].T
     along = chain.origins[0][:3, :3] @ chain.axes[0]
     first, second = chain.origins[0][:3, 3], (chain.origins[0] @ chain.origins[1])[:3, 3]
     foot = first + ((second - first) @ along) * along

@@ -27,8 +27,6 @@ from kerfpath.robots import Robot
 
 SHORTEST = 1e-9
 """Least time (s) of a move."""
-
-
 EVERY = 2e-3
 """Time (s) between two samples of LinuxCNC's motion."""
 

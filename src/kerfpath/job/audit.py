@@ -28,6 +28,7 @@ from kerfpath.errors import InputError
 from kerfpath.execution import Correction, from_stop_to_stop, lengths_of, run_along
 from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.audit_report import (
+    SAME_TIME,
     AuditReport,
     check,
     check_order,
@@ -58,7 +59,7 @@ from kerfpath.job.format import (
     prepare,
     read_job,
 )
-from kerfpath.job.laser_and_gas import SAME_TIME, BeamProcess, check_laser_and_gas
+from kerfpath.job.laser_and_gas import BeamProcess, check_laser_and_gas
 from kerfpath.job.plan_file import (
     NodesData,
     PlanData,
@@ -97,7 +98,7 @@ from kerfpath.transfer import End, TransferMove, back_off
 # Check the order of cutting against the job.
 
 SAME_REST = 0.01
-"""s: the solver of the order counts times in 0.1 ms, one rounding for each candidate and move."""
+"""s: the order counts these times in 1 us, one rounding for each candidate and move."""
 
 
 def check_sequence(
@@ -151,9 +152,9 @@ def _near(
     whole = {i for i in done if list(done).count(i) == 1}
     first = {i: expected.contours[i].candidates[0].nodes for i in whole}
     shapes = [first.get(i, path) for i, path in zip(done, paths, strict=True)]
-    near = np.zeros((len(shapes), len(shapes)), np.bool_)
+    near, trees = np.zeros((len(shapes),) * 2, np.bool_), [cKDTree(each.points) for each in shapes]
     for i, j in combinations(range(len(shapes)), 2):
-        apart, _ = cKDTree(shapes[i].points).query(shapes[j].points)
+        apart, _ = trees[i].query(shapes[j].points)
         near[i, j] = near[j, i] = np.asarray(apart).min() < spacing
     return near
 
@@ -161,7 +162,10 @@ def _near(
 def _rests(
     expected: Expected, plans: Sequence[Plan], moves: Sequence[TransferMove]
 ) -> Array | None:
-    """Return the times (G, G) s between cuts by their moves; None if moves are missing."""
+    """Return the times (G, G) s between cuts by their moves, if they are asked for and known."""
+    sequence = expected.job.sequence
+    if sequence is None or not sequence.heat_time_s:
+        return None
     homes = 2 if expected.job.home is not None else 0
     part = expect_sequence(expected, plans, moves, 0.0) if plans else None
     is_whole = len(moves) == len(plans) - 1 + homes

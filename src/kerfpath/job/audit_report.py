@@ -13,6 +13,8 @@ from kerfpath.job.format import SequenceTable
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
 """The note for a job without a [cell]."""
+SAME_TIME = 2e-3
+"""Tolerance (s) of lead times and waits against the job; controllers round them."""
 
 
 def check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:

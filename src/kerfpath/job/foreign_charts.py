@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -410,10 +411,10 @@ def _csv(file: Path, text: str) -> tuple[list[list[str]], str]:
 
 
 def _spreadsheet(file: Path, sheet: str | None) -> list[list[str]]:
-    """Return the cells of a sheet of a spreadsheet, row by row, from the row of names on."""
-    size = len(_bytes(file))
+    """Return the cells of a sheet of a spreadsheet, row by row."""
+    content = _bytes(file)
     try:
-        sheets = call_apart(read_sheets, str(file.absolute()), size=size)
+        sheets = call_apart(read_sheets, content, size=len(content))
     except InputError as error:
         raise InputError(f"{file}: {error}; save the sheet as CSV") from None
     filled = {name: rows for name, rows in sheets.items() if rows}
@@ -431,7 +432,7 @@ def _spreadsheet(file: Path, sheet: str | None) -> list[list[str]]:
     return rows
 
 
-def read_sheets(file: str) -> dict[str, list[list[str]]]:
+def read_sheets(content: bytes) -> dict[str, list[list[str]]]:
     """Return the cells of each sheet of a spreadsheet as text, row by row from the first.
 
     Raises
@@ -440,7 +441,7 @@ def read_sheets(file: str) -> dict[str, list[list[str]]]:
         The file is no spreadsheet, or damaged; the message does not name it.
     """
     try:
-        with CalamineWorkbook.from_path(file) as book:
+        with CalamineWorkbook.from_filelike(BytesIO(content)) as book:
             sheets = {
                 n: book.get_sheet_by_name(n).to_python(skip_empty_area=False)
                 for n in book.sheet_names

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath.auditor import Check, Unit
-from kerfpath.job.audit_report import check
+from kerfpath.job.audit_report import SAME_TIME, check
 from kerfpath.post import (
     ProgramOptions,
     ReadMove,
@@ -29,8 +29,6 @@ from kerfpath.post import (
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 
-SAME_TIME = 2e-3
-"""Tolerance (s) of lead times and waits against the job; controllers round them."""
 ENDLESS = 60.0
 """Assumed duration, s, of a move whose speed or limits are not known."""
 

@@ -10,9 +10,10 @@ import numpy as np
 from kerfpath.arrays import Array, Ints
 from kerfpath.auditor import Check
 from kerfpath.execution import executed_speeds, lit_of, shares_of
-from kerfpath.job.audit_report import check, count, count_at
+from kerfpath.job.audit_report import SAME_TIME, check, count, count_at
 from kerfpath.job.format import Job
 from kerfpath.post import (
+    SAME_POWER,
     LinearMove,
     ReadGroup,
     ReadMove,
@@ -24,13 +25,9 @@ from kerfpath.post import (
     waits_at_start,
 )
 
-SAME_POWER = 2e-3
-"""Tolerance of shares of the full power, for the digits of analogue outputs."""
 SLACK = 0.01
 """Share of the full power by which a program's power may leave the curve beyond its steps, because
 the digits of its speeds and targets move the borders between them."""
-SAME_LEAD = 2e-3
-"""Tolerance (s) of lead times against the job; controllers round them."""
 
 
 def without_power(read: ReadProgram) -> ReadProgram:
@@ -66,9 +63,8 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
     switched = [(k, s) for k, s in switched if s.signal == "power"]
     if law is None:
         many = len(switched) + len(group.powers)
-        return [count("power", "settings of the power that the job does not ask for", many)] * (
-            many > 0
-        )
+        what = "settings of the power that the job does not ask for"
+        return [count("power", what, many)] if many else []
     odd = [node_of(ends, at) for at, _ in group.powers if at not in (0, 1, len(path) - 1)]
     speed = executed_speeds(
         moves,
@@ -105,7 +101,7 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
         check("power-pierce", "difference of a stage of the pierce from the job's",
               _off_stages(job, group), SAME_POWER, "share"),
         check("power-lead", "difference of the power's lead time from the job's",
-              max(late, default=0.0), SAME_LEAD, "s"),
+              max(late, default=0.0), SAME_TIME, "s"),
         check("power-off", "power while the tool backs off",
               max(said[-1], slope[-1] * full), 0.0, "share", int(ends[-1])),
     ]  # fmt: skip
@@ -142,7 +138,7 @@ def _off_stages(job: Job, group: ReadGroup) -> float:
     if len(expected) != len(found):
         return 1.0
     pairs = list(zip(expected, found, strict=True))
-    if any(abs(one[1] - two[1]) > SAME_LEAD for one, two in pairs):
+    if any(abs(one[1] - two[1]) > SAME_TIME for one, two in pairs):
         return 1.0
     return max(abs(one[0] - two[0]) for one, two in pairs)
 

@@ -53,6 +53,7 @@ from kerfpath.post.places import groups_of as groups_of
 from kerfpath.post.places import issue_lines as issue_lines
 from kerfpath.post.places import issues_before_planning as issues_before_planning
 from kerfpath.post.places import timed_lines as timed_lines
+from kerfpath.post.power import SAME_POWER as SAME_POWER
 from kerfpath.post.power import PowerBySpeed as PowerBySpeed
 from kerfpath.post.power import pierce_stages as pierce_stages
 from kerfpath.post.power import power_curve as power_curve

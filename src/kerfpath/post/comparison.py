@@ -16,6 +16,7 @@ from kerfpath.errors import InputError
 from kerfpath.post.arcs import air_times, cruises, distances
 from kerfpath.post.languages import Language, LanguageSettings, Rules
 from kerfpath.post.places import ReadGroup, groups_of
+from kerfpath.post.power import SAME_POWER
 from kerfpath.post.program import (
     Await,
     CircularMove,
@@ -60,8 +61,6 @@ DERIVED = np.radians(1.0)
 pose, near a singularity. Another posture is farther off."""
 REACH = 4.0
 """Distance (m) that no tip has from an axis: the lever arm of rounding errors of joints."""
-POWER = 2e-3
-"""Largest difference of shares of the full power: the digits of an analogue output."""
 SHARE = 6e-3
 """Largest difference of shares of the full speed: controllers count per cent."""
 
@@ -640,7 +639,7 @@ def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
     ours, theirs = ([(s.signal, s.on, s.needs) for s in move.switches] for move in (a, b))
     return ours != theirs or any(
         abs(one.lead_time - two.lead_time) > digits.lead
-        or abs((one.share or 0.0) - (two.share or 0.0)) > POWER
+        or abs((one.share or 0.0) - (two.share or 0.0)) > SAME_POWER
         for one, two in zip(a.switches, b.switches, strict=True)
     )
 
@@ -747,9 +746,9 @@ def switches_in_words(switches: Iterable[Switch]) -> str:
 
 def _same_power(a: SetPower | ReadPower, b: SetPower | ReadPower) -> bool:
     """Return whether two settings of the power are the same, but for digits."""
-    near = abs(a.per_speed - b.per_speed) <= POWER * max(a.per_speed, b.per_speed)
+    near = abs(a.per_speed - b.per_speed) <= SAME_POWER * max(a.per_speed, b.per_speed)
     near = near and abs(a.lead_time - b.lead_time) <= LEAD
-    return near and abs(a.share - b.share) <= POWER
+    return near and abs(a.share - b.share) <= SAME_POWER
 
 
 def _power(power: SetPower | ReadPower) -> str:

@@ -20,10 +20,12 @@ PowerCurve = tuple[tuple[float, float], ...]
 """Pairs of a share of the programmed speed and a share of the full power, by rising speed."""
 PierceStages = tuple[tuple[float, float], ...]
 """Pairs of a share of the full power and a time, s: the stages of a pierce in their order."""
-MOST_STAGES = 20
-"""Most stages of a pierce."""
+MOST_STAGES, LONGEST_STAGE = 20, 60.0
+"""Most stages of a pierce, and the longest one, s."""
 PowerFollows = Literal["steps", "controller"]
 """Whether the program sets the power in steps, or the controller by the speed that it measures."""
+SAME_POWER = 2e-3
+"""Tolerance of shares of the full power, for the digits of analogue outputs."""
 MARGIN = 0.25
 """Share of a step by which the curve passes the border to the next before the power follows."""
 
@@ -77,10 +79,6 @@ def pierce_stages(pairs: Sequence[Sequence[float]]) -> PierceStages:
     return found
 
 
-LONGEST_STAGE = 60.0
-"""Longest stage of a pierce, s."""
-
-
 @dataclass(frozen=True, slots=True)
 class PowerBySpeed:
     """How the power follows the speed.
@@ -123,15 +121,12 @@ class PowerBySpeed:
     def proportional(self) -> float:
         """The share at full speed of the power in proportion to the speed nearest to the curve."""
         pairs = [(v, p) for v, p in self.curve if v > 0]
-        slopes = [(p + r) / (v + w) for v, p in pairs for w, r in pairs]
-        return min(min(slope, 1.0) for slope in slopes if self._off(slope) == self._least(slopes))
+        slopes = (min((p + r) / (v + w), 1.0) for v, p in pairs for w, r in pairs)
+        return min(slopes, key=lambda slope: (self._off(slope), slope))
 
     def _off(self, slope: float) -> float:
         """Return the largest difference of a power in proportion to the speed from the curve."""
-        return max(abs(min(slope, 1.0) * v - p) for v, p in self.curve)
-
-    def _least(self, slopes: Sequence[float]) -> float:
-        return min(map(self._off, slopes))
+        return max(abs(slope * v - p) for v, p in self.curve)
 
     def refusal(self) -> str:
         """Return why no controller can follow the curve; empty if one can."""

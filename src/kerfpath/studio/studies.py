@@ -344,7 +344,7 @@ class Layouts:
                 if ask.grid:
                     text = with_values(text, [(("plan", "method"), "exact")])
                 job.write_text(text, encoding="utf-8")
-                nodes = nodes_of(contours_of(**job_key(job), goal=ask.goal))
+                nodes = nodes_of(contours_of(**job_key(job)))
                 at = Placement(
                     job=prepared.job,
                     requests=tuple(prepared.contours),

@@ -93,7 +93,7 @@ def evaluate_placements(
         Best value so far; values that do not beat it need not be exact.
     """
     known = load_job(job, digest)
-    contours = contours_of(job, digest, goal)
+    contours = contours_of(job, digest)
     middle = middle_of(known.job, nodes_of(contours))
     of_contours: tuple[ContourValue, ...] = ()
     worst: PlacementValue | None = None
@@ -150,8 +150,8 @@ def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValu
 
 
 @lru_cache(maxsize=2)
-def contours_of(job: str, digest: str, goal: str) -> tuple[SampledContour, ...]:
-    """Return the sampled contours of a job: each at one speed, or for "motion" at its speeds."""
+def contours_of(job: str, digest: str) -> tuple[SampledContour, ...]:
+    """Return the contours of a job, sampled as they are planned."""
     known = load_job(job, digest)
     return sample_contours(known.job, known.part)
 
@@ -405,7 +405,7 @@ def layout_as(
         after = None if best is None else search.whole(best)
     numbers: Numbers = {}
     if best is not None:
-        middle = middle_of(at.job, nodes_of(contours_of(**key, goal=table.goal)))
+        middle = middle_of(at.job, nodes_of(contours_of(**key)))
         numbers = numbers_of(at.job, best.offsets, middle)
     return Layout(
         job=at.job,

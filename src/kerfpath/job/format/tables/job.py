@@ -27,7 +27,7 @@ from kerfpath.job.format.tables.part import (
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
-from kerfpath.job.format.tables.process import ProcessTable, curve_pairs, stage_pairs
+from kerfpath.job.format.tables.process import ProcessTable, checked_pairs
 from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
@@ -54,6 +54,8 @@ from kerfpath.post import (
     ProgramOptions,
     Request,
     languages,
+    pierce_stages,
+    power_curve,
 )
 from kerfpath.robots import postures_named
 
@@ -247,15 +249,8 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
             raise fault("each partner once", repr(partners), "remove the second")
         return partners
 
-    @field_validator("power_by_speed")
-    @classmethod
-    def _is_a_curve(cls, pairs: list[list[float]] | None) -> list[list[float]] | None:
-        return None if pairs is None else curve_pairs(pairs)
-
-    @field_validator("pierce_stages")
-    @classmethod
-    def _are_stages(cls, pairs: list[list[float]] | None) -> list[list[float]] | None:
-        return None if pairs is None else stage_pairs(pairs)
+    _is_a_curve = field_validator("power_by_speed")(checked_pairs(power_curve))
+    _are_stages = field_validator("pierce_stages")(checked_pairs(pierce_stages))
 
     @model_validator(mode="after")
     def _stages_stand_alone(self) -> ProgramTable:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -18,7 +18,7 @@ from kerfpath.job.format.values import (
     fault_in_words,
     key,
 )
-from kerfpath.post import pierce_stages, power_curve
+from kerfpath.post import power_curve
 
 NORMAL = "normal"
 """The technique of a row, or of a job, that names none."""
@@ -50,32 +50,21 @@ Quality = Annotated[Word | None, key("a quality, as charts call it", '"fine"')]
 Thickness = Annotated[Positive, key("a number above 0, at most 500, in mm", "3", le=500)]
 
 
-def curve_pairs(pairs: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Return the pairs of a curve of the power by the speed.
-
-    Raises
-    ------
-    PydanticCustomError
-        It is no such curve.
-    """
-    try:
-        return [list(pair) for pair in power_curve(pairs)]
-    except InputError as error:
-        raise fault_in_words(f"{error}".removeprefix("power_by_speed: ")) from None
+Pairs = list[list[float]] | None
 
 
-def stage_pairs(pairs: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Return the stages of a pierce.
+def checked_pairs(read: Callable[[Sequence[Sequence[float]]], object]) -> Callable[[Pairs], Pairs]:
+    """Return a validator of pairs, or None, that refuses what `read` refuses."""
 
-    Raises
-    ------
-    PydanticCustomError
-        They are none.
-    """
-    try:
-        return [list(pair) for pair in pierce_stages(pairs)]
-    except InputError as error:
-        raise fault_in_words(f"{error}".removeprefix("pierce_stages: ")) from None
+    def checked(pairs: Pairs) -> Pairs:
+        if pairs is not None:
+            try:
+                read(pairs)
+            except InputError as error:
+                raise fault_in_words(f"{error}".partition(": ")[2]) from None
+        return pairs
+
+    return checked
 
 
 class StageTable(Table):
@@ -115,8 +104,8 @@ class RowTable(CutTable):
     stand_off_mm: Height = None
     power_w: Power = None
     power_by_speed: Annotated[
-        list[list[float]] | None,
-        AfterValidator(lambda pairs: None if pairs is None else curve_pairs(pairs)),
+        Pairs,
+        AfterValidator(checked_pairs(power_curve)),
         key("pairs [share of the speed, share of power_w]", "[[0.0, 0.3], [1.0, 1.0]]"),
     ] = None
     frequency_hz: Frequency = None
