@@ -273,8 +273,9 @@ class MoveTimes:
 # -----------------------------------------------------------------------------
 # The order of cutting: a generalised travelling-salesman problem over groups of candidates.
 
-TICK = 1e-4
-"""s: resolution of times in the solver."""
+TICK, REST_TICK = 1e-4, 1e-6
+"""s: resolution of times in the solver, and of those between groups that need a rest: they are sums
+over many moves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -457,7 +458,7 @@ def _let_rest(
     taken: Mapping[tuple[int, int], Any], without: Sequence[Any],
 ) -> None:  # fmt: skip
     """Add to a model of an order that groups have their rest, but for the rounding of times."""
-    G, ticks = len(rest), np.rint(np.where(np.isfinite(time), time, 0.0) / TICK).astype(int)
+    G, ticks = len(rest), np.rint(np.where(np.isfinite(time), time, 0.0) / REST_TICK).astype(int)
     longest = np.zeros(G, int)
     np.maximum.at(longest, group, ticks[:, 1:].max(axis=0))
     end = [model.new_int_var(0, int(longest.sum()), f"end of {h}") for h in range(G)]
@@ -467,9 +468,9 @@ def _let_rest(
             model.add(end[group[b - 1]] == begun + int(ticks[a, b])).only_enforce_if(way)
     begin = list(end)
     for i, (h, its_own) in enumerate(zip(group.tolist(), own.tolist(), strict=True)):
-        begin[h] = begin[h] - round(its_own / TICK) * (1 - without[i])
+        begin[h] = begin[h] - round(its_own / REST_TICK) * (1 - without[i])
     for g, h in np.argwhere(np.triu(rest)).tolist():
-        least = int(rest[g, h] / TICK) - G
+        least = int(rest[g, h] / REST_TICK) - G
         first = model.new_bool_var(f"{g} before {h}")
         model.add(begin[h] >= end[g] + least).only_enforce_if(first)
         model.add(begin[g] >= end[h] + least).only_enforce_if(~first)
@@ -481,7 +482,7 @@ def keeps_rest(order: Ints, group: Ints, own: Array, time: Array, rest: Array) -
         return True
     end = np.cumsum(time[np.append(0, order[:-1] + 1), order + 1])
     between = (end - own[order])[None] - end[:, None]
-    enough = between >= rest[np.ix_(group[order], group[order])] - 2 * TICK * (len(order) + 1)
+    enough = between >= rest[np.ix_(group[order], group[order])] - 2 * REST_TICK * (len(order) + 1)
     return bool(enough[np.triu_indices(len(order), 1)].all())
 
 
