@@ -135,7 +135,7 @@ def _check_outputs(
         yield ProgramIssue("error", "power", refusal, "program")
         return
     if getattr(settings, "power_output", None) is not None:
-        if settings.power_full is None:  # type: ignore[attr-defined]  # it goes with the output
+        if getattr(settings, "power_full", None) is None:
             message = f"say the value at full power with power_full in [program.{language.name}]"
             yield ProgramIssue("error", "output", message, "program")
         elif "power" not in program.signals:
