@@ -178,21 +178,24 @@ def test_a_contour_may_have_a_technique_of_its_own(job):
     assert {"- for hole 10", "- for slot", "- power 1200 W", "- power 1800 W"} <= set(lines)
 
 
-def test_rows_that_differ_in_what_a_program_has_once_are_refused(job):
+def test_contours_have_the_pierce_of_their_row_unless_the_job_says_one(job):
     def edit(text):
-        return text.replace('name = "slot"', 'name = "slot"\ntechnique = "small-hole"').replace(
-            "[program]\n", "[program]\n"
-        )
+        return text.replace('name = "slot"', 'name = "slot"\ntechnique = "small-hole"')
 
     chart = CHART.replace("pierce = [{ time_s = 0.3 }]", "pierce = [{ time_s = 0.1 }]")
     job()  # writes the chart
     path = Path(read_job_folder(job)) / "charts" / "own.toml"
     path.write_text(chart)
-    refused(lambda: job(edit=edit), "pierce_time_s of [program]", "0.3 and 0.1", "write")
+    made = job(edit=edit)
+    assert made.program.of("hole 10").pierce_time == pytest.approx(0.3)
+    assert made.program.of("slot").pierce_time == 0.1
+    found = {(o.of, o.key): (o.shown, o.origin) for o in origins_of(made.text, made.source)}
+    assert found["slot", "pierce_time_s"] == ("0.1", "charts/own.toml row 3")
+    assert ("program", "pierce_time_s") not in found
     both = job(
         edit=lambda text: edit(text).replace("[program]\n", "[program]\npierce_time_s = 0.2\n")
     )
-    assert both.program.pierce_time == 0.2
+    assert both.program.of("slot").pierce_time == both.program.pierce_time == 0.2
 
 
 def read_job_folder(job):

@@ -185,7 +185,7 @@ def power_along(program: Program, section: Section, options: ProgramOptions) -> 
     InputError
         As `executed_speeds`.
     """
-    law = options.power
+    law = options.of(section.contour).power
     if law is None:
         return None
     moves = [move for move in section.moves if isinstance(move, LinearMove)][:-1]
@@ -264,13 +264,15 @@ def with_power(program: Program, options: ProgramOptions) -> Program:
     InputError
         The language cannot set the power along the path; or as `executed_speeds`.
     """
-    law = options.power
-    if law is None:
-        return program
-    if why := options.robot_language.power_refusal(law.follows) or law.refusal():
-        raise InputError(why)
-    sections = tuple(_with_power(program, s, law, options) for s in program.sections)
-    return replace(program, sections=sections)
+    sections = []
+    for section in program.sections:
+        law = options.of(section.contour).power
+        if law is None:
+            return program
+        if why := options.robot_language.power_refusal(law.follows) or law.refusal():
+            raise InputError(why)
+        sections.append(_with_power(program, section, law, options))
+    return replace(program, sections=tuple(sections))
 
 
 def _with_power(
@@ -281,7 +283,7 @@ def _with_power(
     approach, *cut, retract = (move for move in section.moves if isinstance(move, LinearMove))
     powers = dict(zip(cut, along.set.tolist(), strict=True))
     after = dict(pairwise([*cut, None]))
-    stages = [share for share, _ in options.pierce]
+    stages = [share for share, _ in options.of(section.contour).pierce]
     by_controller = law.follows == "controller"
     lead = options.lead_time if options.robot_language.ahead else 0.0
     slope = law.proportional / max(move.speed for move in cut)

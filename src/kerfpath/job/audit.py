@@ -485,7 +485,7 @@ def _process_checks(
     fast = int(np.argmax(excess - digits))
     most = SAME_SPEED + digits[fast]
     node = int(np.argmax(wrong)) if wrong.any() else 0
-    process = BeamProcess.of(job.program)
+    process = BeamProcess.of(job.program.of(candidate.nodes.name))
     expected = np.full(len(cut.lead_times), process.lead_time)
     expected[:1] = process.start_lead
     lead = np.abs(cut.lead_times - expected)
@@ -660,6 +660,8 @@ class Audit:
         names = self.expected.names
         read = add_tips(read, job)
         cuts, home = read_cuts(read, job)
+        closest = [_closest(cut, contours) for cut in cuts]
+        options = [job.program.of(name) for name in names]
         tables: dict[str, list[Check]] = {}
         places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
@@ -667,14 +669,15 @@ class Audit:
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
         tables[name] = [
             check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
-            *check_laser_and_gas(read, job.robot, BeamProcess.of(job.program)),
+            *check_laser_and_gas(
+                read, job.robot, [BeamProcess.of(options[which]) for _, which, _ in closest]
+            ),
             _check_paths(read),
         ]
         done: list[int] = []
         starts: list[str] = []
         followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
-        for cut in cuts:
-            apart, which, c = _closest(cut, contours)
+        for cut, (apart, which, c) in zip(cuts, closest, strict=True):
             title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
             places[title] = tuple(move.place for move in cut.moves)
             if apart >= NEAR:
@@ -687,7 +690,7 @@ class Audit:
             tables[title], along = check_cut(job, candidate, cut, cell)
             if not np.isnan(cut.q).any():
                 moves = _moves(cut, job.program.rules.controller)
-                tables[title] += check_power(job, cut.group, moves, cut.ends)
+                tables[title] += check_power(job, options[which], cut.group, moves, cut.ends)
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)

@@ -438,7 +438,7 @@ def expect_sequence(
         chosen=(),
         retract=program.retract,
         approach_speed=program.approach_speed,
-        pierce_time=program.pierce_time,
+        pierce_time=program.pierce_times([plan.name for plan in plans]),
     )
     order = Order(candidates=candidates, duration=part.cycle_time, at_least=at_least)
     return replace(part, order=order)

@@ -96,6 +96,7 @@ class _Span:
     start: float
     end: float
     step: int
+    process: BeamProcess
     waits: bool = False
     move: ReadMove | None = None
 
@@ -110,7 +111,9 @@ class _Event:
     step: int
 
 
-def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -> list[Check]:
+def check_laser_and_gas(
+    read: ReadProgram, robot: Robot, processes: Sequence[BeamProcess]
+) -> list[Check]:
     """Return the checks of beam and gas over a whole program; their node is its step.
 
     Parameters
@@ -118,12 +121,14 @@ def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -
     read : ReadProgram
         The program, with the tip poses of its path.
     robot : Robot
-    process : BeamProcess
+    processes : sequence of BeamProcess
+        That of each cut in the order of the program, at least one.
     """
-    spans, events = _timeline(read, robot)
+    spans, events = _timeline(read, robot, processes)
+    process = processes[-1]
     beam = _on(events, "laser", shift=process.lead_time)
     rows = [
-        _row(f"beam-{what}", WORDS[what], _wrongly(spans, beam, what, process), SAME_TIME, "s")
+        _row(f"beam-{what}", WORDS[what], _wrongly(spans, beam, what), SAME_TIME, "s")
         for what in WORDS
     ]
     said = "stop points in the cut with the laser on"
@@ -137,7 +142,7 @@ def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -
         left = [event for event in events if event.signal == signal][-1:]
         found = [(float(event.on), event.step) for event in left]
         rows.append(_row(f"{signal}-at-the-end", f"{signal} on at the end", found, 0, "count"))
-    return rows + _gas(spans, events, beam, process)
+    return rows + _gas(spans, events, beam, switched=process.gas_lead is not None)
 
 
 def _row(
@@ -150,13 +155,19 @@ def _row(
     return check(code, title, value, limit, unit, step)
 
 
-def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event]]:
-    """Return what a program does and switches over time, from 0 on."""
+def _timeline(
+    read: ReadProgram, robot: Robot, processes: Sequence[BeamProcess]
+) -> tuple[list[_Span], list[_Event]]:
+    """Return what a program does and switches over time, from 0 on.
+
+    What comes behind the last cut has its process.
+    """
     steps = {id(step): k for k, step in enumerate(read.steps)}
     spans: list[_Span] = []
     events: list[_Event] = []
     clock, q, T = 0.0, None, None
-    for group in groups_of(read):
+    for number, group in enumerate(groups_of(read)):
+        process = processes[min(number, len(processes) - 1)]
         waits: dict[int, list[ReadWait]] = {}
         for behind, wait in group.waits:
             waits.setdefault(behind, []).append(wait)
@@ -166,8 +177,9 @@ def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event
             took = _took(move, robot, q, T)
             what = _what(at, len(group.path))
             spans.append(
-                _Span(what=what, start=clock, end=clock + took, step=steps[id(move)], move=move)
-            )
+                _Span(what=what, start=clock, end=clock + took, step=steps[id(move)],
+                      process=process, move=move)
+            )  # fmt: skip
             clock += took
             for switch in move.switches:
                 if switch.signal == "power":  # see kerfpath.job.power
@@ -184,7 +196,7 @@ def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event
                 stands = _stands(at, len(group.path))
                 spans.append(
                     _Span(what=stands, start=clock, end=clock + wait.time, step=steps[id(wait)],
-                          waits=True)
+                          process=process, waits=True)
                 )  # fmt: skip
                 clock += wait.time
     return spans, sorted(events, key=lambda event: event.time)
@@ -252,7 +264,6 @@ def _wrongly(
     spans: Sequence[_Span],
     beam: Sequence[tuple[float, float, int]],
     what: What,
-    process: BeamProcess,
 ) -> list[tuple[float, int]]:
     """Return for how long (s) the beam is on where it must not be, and the step there.
 
@@ -267,7 +278,7 @@ def _wrongly(
         on = _overlap(span.start, span.end, beam)
         if what == "start":
             pierced += on
-            on = max(pierced - process.pierce_time, 0.0)
+            on = max(pierced - span.process.pierce_time, 0.0)
         found.append((on, span.step))
     return found
 
@@ -316,23 +327,23 @@ def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
 
 
 def _gas(
-    spans: Sequence[_Span], events: Sequence[_Event], beam: Sequence[tuple[float, float, int]],
-    process: BeamProcess,
-) -> list[Check]:  # fmt: skip
+    spans: Sequence[_Span],
+    events: Sequence[_Event],
+    beam: Sequence[tuple[float, float, int]],
+    *,
+    switched: bool,
+) -> list[Check]:
     """Return the checks that the gas flows before and with the beam, and nowhere else."""
     gas = _on(events, "gas", shift=0.0)
-    if process.gas_lead is None:
+    if not switched:
         found = [(1.0, event.step) for event in events if event.signal == "gas"]
         return [_row("gas", "gas switches that the job does not ask for", found, 0, "count")]
     spread = [(max(on, 0.0), off, step) for on, off, step in beam if off < np.inf]
     without = [(off - on - _overlap(on, off, gas), step) for on, off, step in spread]
-    starts = [span for span in spans if span.what == "approach"]
-    late = [
-        (process.gas_lead - _overlap(span.end - process.gas_lead, span.end, gas), span.step)
-        for span in starts
-    ]
+    starts = [(span, span.process.gas_lead or 0.0) for span in spans if span.what == "approach"]
+    late = [(lead - _overlap(span.end - lead, span.end, gas), span.step) for span, lead in starts]
     # The gas may also start at the beginning of the approach.
-    ahead = [(min(span.end - process.gas_lead, span.start), span.end, span.step) for span in starts]
+    ahead = [(min(span.end - lead, span.start), span.end, span.step) for span, lead in starts]
     idle = [
         (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
          span.step)

@@ -43,7 +43,7 @@ from kerfpath.comfort import MEASURES
 from kerfpath.contour import KINDS, Contour
 from kerfpath.dynamics import Load
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.job.format import AuditTable, ProgramTable, Tolerances, sheet_of
+from kerfpath.job.format import AuditTable, ProgramTable, Tolerances, contours_of, sheet_of
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof
@@ -863,7 +863,8 @@ class PlanFile:
         allowed = self.tolerances.path
         table = self.table("program", ProgramTable, **changes)
         try:
-            return table.resolve(stem, allowed, sheet_of(self.job))
+            own = contours_of(self.job)
+            return table.resolve(stem, allowed, sheet_of(self.job), own)
         except (ValidationError, LookupError, TypeError, AttributeError) as error:
             said = " ".join(str(error).split())
             raise InputError(f"{self.path}: its [process] table is not valid ({said})") from None

@@ -15,6 +15,7 @@ from kerfpath.job.format import Job
 from kerfpath.post import (
     SAME_POWER,
     LinearMove,
+    ProgramOptions,
     ReadGroup,
     ReadMove,
     ReadPower,
@@ -45,12 +46,16 @@ def without_power(read: ReadProgram) -> ReadProgram:
     return replace(read, sections=tuple(rest(section) for section in read.sections))
 
 
-def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: Ints) -> list[Check]:
+def check_power(
+    job: Job, options: ProgramOptions, group: ReadGroup, moves: Sequence[LinearMove], ends: Ints
+) -> list[Check]:
     """Return the checks of the power along a cut of a program.
 
     Parameters
     ----------
     job : Job
+    options : ProgramOptions
+        Those of the contour.
     group : ReadGroup
         The cut with its approach and retract.
     moves : sequence of LinearMove
@@ -58,7 +63,7 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
     ends : (m,) int
         Node of the target of each.
     """
-    path, law = group.path, job.program.power
+    path, law = group.path, options.power
     switched = [(k, s) for k, move in enumerate(path) for s in move.switches]
     switched = [(k, s) for k, s in switched if s.signal == "power"]
     if law is None:
@@ -69,7 +74,7 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
     speed = executed_speeds(
         moves,
         job.robot,
-        job.program,
+        options,
         T_base_part=job.placement,
         T_flange_tip=job.tool,
     )
@@ -83,7 +88,7 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
         same = np.abs(slope[1:-1] * full - law.proportional) <= SAME_POWER
         wrong = ~same | (said[1:-1] > 0)
     k = int(np.argmax(off))
-    lead = job.program.lead_time if job.program.robot_language.ahead else 0.0
+    lead = options.lead_time if options.robot_language.ahead else 0.0
     late = [abs(s.lead_time - lead) for _, s in switched]
     late += [abs(power.lead_time - lead) for _, power in group.powers if power.per_speed]
     return [
@@ -99,7 +104,7 @@ def check_power(job: Job, group: ReadGroup, moves: Sequence[LinearMove], ends: I
                  [int(ends[i]) for i in np.flatnonzero(wrong)]),
         count_at("power-standing", "settings of the power where the robot moves", odd),
         check("power-pierce", "difference of a stage of the pierce from the job's",
-              _off_stages(job, group), SAME_POWER, "share"),
+              _off_stages(options, group), SAME_POWER, "share"),
         check("power-lead", "difference of the power's lead time from the job's",
               max(late, default=0.0), SAME_TIME, "s"),
         check("power-off", "power while the tool backs off",
@@ -124,13 +129,13 @@ def _in_moves(group: ReadGroup) -> Array:
     return np.array(found).T
 
 
-def _off_stages(job: Job, group: ReadGroup) -> float:
+def _off_stages(options: ProgramOptions, group: ReadGroup) -> float:
     """Return by how much a share of the power differs in the stages of the pierce; 1 if times do.
 
     Waits at one power are one stage.
     """
-    asked = [share for share, _ in job.program.pierce]
-    waits = waits_at_start(job.program, laser_start(job.program)[1]) if asked else []
+    asked = [share for share, _ in options.pierce]
+    waits = waits_at_start(options, laser_start(options)[1]) if asked else []
     said = [(_at(group, wait.line), wait.time) for at, wait in group.waits if at == 1]
     expected, found = _merged(list(zip(asked, waits, strict=True))), _merged(said)
     if not asked:

@@ -348,8 +348,8 @@ def build_program(
     air = _Air(first, share, min(share, options.start_speed))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
-        steps = tuple(_steps(plan, air.start(way), options))
-        sections.append(Section(name=section_name, steps=steps))
+        steps = tuple(_steps(plan, air.start(way), options.of(plan.name)))
+        sections.append(Section(name=section_name, steps=steps, contour=plan.name))
         air.here = back_off(plan, "end", options.retract)
     if home:
         back = tuple(air.moves(home))

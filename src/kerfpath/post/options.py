@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
 from kerfpath.errors import InputError
@@ -44,6 +44,15 @@ class ProgramKeywords(TypedDict, total=False):
     power_follows: PowerFollows
     pierce_stages: PierceStages | None
     pierce_power: float | None
+    contours: Mapping[str, ProgramKeywords]
+
+
+PIERCE = ("pierce_time", "pierce_stages", "pierce_power")
+"""Options of the pierce, which replace each other."""
+OF_CONTOURS = (*PIERCE, "gas_lead", "power_by_speed")
+"""Options that a contour may have of its own."""
+PIECE = ", piece "
+"""What comes between the name of a contour and the number of one of its pieces."""
 
 
 @documented
@@ -207,6 +216,12 @@ class ProgramOptions:
         what="a share of the full power above 0, at most 1",
         example="0.6",
     )
+    contours: Mapping[str, ProgramKeywords] = setting(
+        dict,
+        "what each contour has of its own, by its name: `pierce_time`, `pierce_stages`, "
+        "`pierce_power`, `gas_lead`, `power_by_speed`; empty: all have the same",
+        takes=None,
+    )
     handshakes: Sequence[Handshake] = setting(
         (),
         "handshakes before each contour, in order, with the tool backed off. Requests are "
@@ -232,6 +247,7 @@ class ProgramOptions:
             object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
         object.__setattr__(self, "handshakes", tuple(self.handshakes))
         object.__setattr__(self, "remarks", tuple(map(plain, self.remarks)))
+        self._check_contours()
 
     def _take_stages(self, stages: PierceStages) -> None:
         """Take the time of the pierce from its stages."""
@@ -245,6 +261,45 @@ class ProgramOptions:
             )
         object.__setattr__(self, "pierce_stages", stages)
         object.__setattr__(self, "pierce_time", took)
+
+    def _check_contours(self) -> None:
+        """Check the options of each contour: gas and power are switched in all of them or none."""
+        for name, own in self.contours.items():
+            if unknown := [key for key in own if key not in OF_CONTOURS]:
+                raise InputError(
+                    f"contours: expected {', '.join(OF_CONTOURS)} for {name!r}, got {unknown[0]!r}"
+                )
+        for key in ("gas_lead", "power_by_speed"):
+            lacks = [name for name in self.contours if getattr(self.of(name), key) is None]
+            if lacks and len(lacks) < len(self.contours):
+                raise InputError(
+                    f"contours: expected {key} for every contour or for none, got none for "
+                    f"{lacks[0]!r}"
+                )
+
+    def of(self, contour: str) -> ProgramOptions:
+        """Return the options of a contour, or of a piece of one, by its name.
+
+        Raises
+        ------
+        InputError
+            Other contours have options of their own, but this one is not among them.
+        """
+        if not self.contours:
+            return self
+        own = self.contours.get(contour, self.contours.get(contour.rpartition(PIECE)[0]))
+        if own is None:
+            raise InputError(f"contours: expected options for {contour!r}, got none")
+        keywords: dict[str, Any] = {**own, "contours": {}}
+        if {"pierce_time", "pierce_stages"} & set(own):
+            keywords = {"pierce_time": 0.0, "pierce_stages": None} | keywords
+        return replace(self, **keywords)
+
+    def pierce_times(self, contours: Sequence[str]) -> float | tuple[float, ...]:
+        """Return the time to pierce at each contour, s; one number if all have the same."""
+        if not self.contours:
+            return self.pierce_time
+        return tuple(self.of(name).pierce_time for name in contours)
 
     @property
     def pierce(self) -> PierceStages:

@@ -301,17 +301,18 @@ def issues_before_planning(
     per_speed = float(options.power_follows == "controller")
     radius = SOME_ZONE if options.zone == "auto" else options.zone
     sections = []
-    for section, (_, speed) in zip(names, cuts, strict=True):
-        laser, wait = laser_start(options)
+    for section, (contour, speed) in zip(names, cuts, strict=True):
+        own = options.of(contour)
+        laser, wait = laser_start(own)
         on = [laser]
         off = [Switch(signal="laser", on=False, lead_time=options.lead_time)]
-        if options.gas_lead is not None:
-            on.insert(0, Switch(signal="gas", on=True, lead_time=options.gas_lead))
+        if own.gas_lead is not None:
+            on.insert(0, Switch(signal="gas", on=True, lead_time=own.gas_lead))
             off.append(Switch(signal="gas", on=False))
         steps = (
             JointMove(q=q, speed=1.0),
             *options.handshakes,
-            *([] if options.power is None else [SetPower(share=0.0, per_speed=per_speed)]),
+            *([] if own.power is None else [SetPower(share=0.0, per_speed=per_speed)]),
             LinearMove(
                 T_part_tip=here,
                 q=q,
@@ -319,7 +320,7 @@ def issues_before_planning(
                 duration=1.0,
                 switches=tuple(on),
             ),
-            *(Wait(time=time) for time in waits_at_start(options, wait)),
+            *(Wait(time=time) for time in waits_at_start(own, wait)),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=radius),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, switches=tuple(off)),
         )

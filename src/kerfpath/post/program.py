@@ -301,10 +301,11 @@ Step = Move | Wait | SetPower | Handshake | Comment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """The steps of one contour, or of a part of one, with an identifier."""
+    """The steps of one contour, or of a part of one, with an identifier and the contour's name."""
 
     name: str
     steps: tuple[Step, ...]
+    contour: str = ""
 
     __repr__ = short_repr
 

@@ -214,8 +214,8 @@ class PartPlan:
         Contour and candidate of each plan, by number.
     retract, approach_speed : float m, m/s
         How far and how fast the tool backs off before and after each contour.
-    pierce_time : float s
-        Time to pierce at each contour.
+    pierce_time : float s, or (P,) s
+        Time to pierce at each contour, or at that of each plan.
     """
 
     plans: tuple[Plan, ...]
@@ -224,7 +224,7 @@ class PartPlan:
     chosen: tuple[tuple[int, int], ...]
     retract: float
     approach_speed: float
-    pierce_time: float
+    pierce_time: float | tuple[float, ...]
 
     __repr__ = short_repr
 
@@ -242,7 +242,8 @@ class PartPlan:
     @property
     def piercing_time(self) -> float:
         """Time for piercing at all contours (s)."""
-        return len(self.plans) * self.pierce_time
+        each = self.pierce_time
+        return sum(each) if isinstance(each, tuple) else len(self.plans) * each
 
     @property
     def rests(self) -> Array:
@@ -251,10 +252,10 @@ class PartPlan:
         Its retract and the approach of the other are left out; the lower triangle is zero.
         """
         here = len(self.moves) - len(self.plans) + 1  # with a home, the first move comes from there
-        own = [p.time[-1] - p.time[0] + self.pierce_time for p in self.plans]
+        own = np.array([p.time[-1] - p.time[0] for p in self.plans]) + self.pierce_time
         down_and_up = 2 * self.retract / self.approach_speed
         took = np.array([m.duration for m in self.moves[here // 2 :]][: len(self.plans) - 1])
-        begin = np.append(0.0, np.cumsum(np.array(own[:-1]) + down_and_up + took))
+        begin = np.append(0.0, np.cumsum(own[:-1] + down_and_up + took))
         end = begin + own + down_and_up
         return np.triu(begin[None] - end[:, None], 1)
 
@@ -276,7 +277,7 @@ class OrderKeywords(TypedDict, total=False):
     retract: float
     approach_speed: float
     air_speed: float
-    pierce_time: float
+    pierce_time: float | Sequence[float]
     seconds: float
 
 
@@ -303,8 +304,8 @@ class OrderOptions:
         How far and how fast the tool backs off along its axis.
     air_speed : float
         Share of the full speed of transfer moves; their least time is divided by it.
-    pierce_time : float s
-        Time to pierce at each contour.
+    pierce_time : float s, or one for each contour
+        Time to pierce.
     seconds : float s
         Time limit of the order solver, and of each search for a way around; searches without a
         result end after `longest_search(seconds)` in total.
@@ -324,7 +325,7 @@ class OrderOptions:
     retract: float = 0.05
     approach_speed: float = 0.1
     air_speed: float = 1.0
-    pierce_time: float = 0.0
+    pierce_time: float | Sequence[float] = 0.0
     seconds: float = 10.0
 
     __repr__ = short_repr
@@ -336,7 +337,9 @@ class OrderOptions:
         _set(self, "approach_speed", speed)
         _set(self, "heat_spacing", not_negative(self.heat_spacing, "heat_spacing", unit="m"))
         _set(self, "heat_time", not_negative(self.heat_time, "heat_time", unit="s"))
-        _set(self, "pierce_time", not_negative(self.pierce_time, "pierce_time", unit="s"))
+        each = self.pierce_time if isinstance(self.pierce_time, Sequence) else [self.pierce_time]
+        times = tuple(not_negative(one, "pierce_time", unit="s") for one in each)
+        _set(self, "pierce_time", times if isinstance(self.pierce_time, Sequence) else times[0])
         _set(self, "air_speed", scalar(self.air_speed, "air_speed", above=0.0))
 
 
@@ -747,7 +750,9 @@ def order_plans(
         if home is not None and air.home is None:
             air.home = home
         own = np.array([p.time[-1] - p.time[0] for p in plans])
-        own += options.pierce_time + 2 * options.retract / options.approach_speed
+        pierce = options.pierce_time
+        each = np.array(pierce)[group if isinstance(pierce, Sequence) else ...]
+        own += each + 2 * options.retract / options.approach_speed
         found = _settle_order(
             air, group, own, before, np.where(warm, options.heat_time, 0.0), options.seconds
         )
@@ -761,6 +766,9 @@ def order_plans(
         if not places:
             raise further.mentioned_in(found)
     made, moves = air.unrolled(order.candidates)
+    pierce = options.pierce_time
+    if isinstance(pierce, Sequence):
+        pierce = tuple(pierce[offered[k][0]] for k in order.candidates.tolist())
     return PartPlan(
         plans=made,
         moves=moves,
@@ -768,7 +776,7 @@ def order_plans(
         chosen=tuple(offered[k] for k in order.candidates.tolist()),
         retract=options.retract,
         approach_speed=options.approach_speed,
-        pierce_time=options.pierce_time,
+        pierce_time=pierce,
     )
 
 

@@ -159,7 +159,8 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
         raise InputError(f"program in {language}: {said}; correct [program]") from None
     # Keep the name of the job: the file that was read may be a copy with another name.
     job = result.job
-    options = asked.resolve(job.program.name, job.tolerances.path)
+    own = job.program.contours
+    options = asked.resolve(job.program.name, job.tolerances.path, contours=own)
     return replace(result, job=replace(result.job, program=options))
 
 

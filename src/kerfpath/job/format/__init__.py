@@ -25,6 +25,7 @@ from kerfpath.job.format.prepared import prepare as prepare
 from kerfpath.job.format.process import DIFFER as DIFFER
 from kerfpath.job.format.process import TITLE as TITLE
 from kerfpath.job.format.process import Origin as Origin
+from kerfpath.job.format.process import contours_of as contours_of
 from kerfpath.job.format.process import origins_of as origins_of
 from kerfpath.job.format.process import row_words as row_words
 from kerfpath.job.format.process import sheet_of as sheet_of

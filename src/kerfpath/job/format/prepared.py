@@ -20,7 +20,9 @@ from kerfpath.front import Subproblem
 from kerfpath.job.format.cell import cell_of_job
 from kerfpath.job.format.contour import ContourSpec
 from kerfpath.job.format.faults import all_of
+from kerfpath.job.format.process import contours_of, with_cuts
 from kerfpath.job.format.reading import Job
+from kerfpath.job.format.tables.process import NORMAL
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.operations import edge, nearest, quick_turns
 from kerfpath.options import PlanOptions
@@ -294,6 +296,7 @@ def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> Pre
     """
     part = part or job.read_part()
     tasks = job.tasks(part)  # first, so that a misspelt name is reported before the cell is read
+    job = _with_techniques(job, tasks)
     requests, faults = list[CutRequest](), list[InputError]()
     try:
         cell = cell_of_job(job, part) if cell is None else cell
@@ -307,6 +310,15 @@ def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> Pre
     if faults:
         raise all_of(faults)
     return PreparedJob.of(job, part, cell, requests)
+
+
+def _with_techniques(job: Job, tasks: Sequence[ContourSpec]) -> Job:
+    """Return the job with the options that its contours have by their techniques."""
+    normal = job.source.get("process", {}).get("technique", NORMAL)
+    cut_by = {task.name: task.table.technique or normal for task in tasks}
+    source = with_cuts(job.source, cut_by)
+    program = replace(job.program, contours=contours_of(source))
+    return replace(job, source=source, program=program)
 
 
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:

@@ -27,7 +27,7 @@ from kerfpath.job.format.tables import (
     RowTable,
     StageTable,
 )
-from kerfpath.post import ProgramOptions
+from kerfpath.post import ProgramKeywords, ProgramOptions
 
 LEADS = {"lead_in": "lead_in_mm", "lead_out": "lead_out_mm"}
 """The key of a chart that has the length of each lead of a contour."""
@@ -55,6 +55,8 @@ SHEET = {
     "note": "{}",
 }
 """Values of a row that the operator sets, and their words."""
+CURVE = "power_by_speed"
+"""The key of the power by the speed, in rows and in [program]."""
 STAGE = {
     "time_s": "{:g} s",
     "power_w": "{:g} W",
@@ -92,6 +94,9 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
         process = _OnlyProcess.model_validate(source).process
     except ValidationError as error:
         raise refusal(path, text, error) from None
+    if process.cut_by is not None:
+        said = "expected technique in each [[contour]], got cut_by, which plan.json files have"
+        raise refusal_at(path, ("process", "cut_by"), f"{said}; remove it")
     contours = source.get("contour")
     if not isinstance(contours, list) or not all(isinstance(one, dict) for one in contours):
         return source
@@ -116,14 +121,7 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
     if faults:
         raise all_of(faults)
     rows = list(chosen.values())
-    once: dict[str, Sequence[Any]] = {"pierce_time_s": [row.pierce_time for row in rows]}
-    if _names(source, "power_output") and _takes_stages(source["program"], rows):
-        once = {"pierce_stages": [row.pierce_stages for row in rows]}
-    if _names(source, "gas_output"):
-        once["gas_lead_s"] = [row.gas_lead_s for row in rows]
-    if _names(source, "power_output"):
-        once["power_by_speed"] = [row.power_by_speed for row in rows]
-    program = _once(path, source, "program", once)
+    program = _alike(path, source, rows)
     cell = source.get("cell")
     if isinstance(cell, dict):
         cell = _once(path, source, "cell", {"stand_off_mm": [row.stand_off_mm for row in rows]})
@@ -152,14 +150,102 @@ def _filled(contour: Mapping[str, Any], row: RowTable) -> dict[str, Any]:
     return table
 
 
-def _takes_stages(program: Mapping[str, Any], rows: Sequence[RowTable]) -> bool:
-    """Return whether the program of a job sets the power in the stages of the pierce of its rows.
+def _alike(path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]) -> Any:
+    """Return [program] with what it sets alike for all rows; other values are of contours."""
+    program = source.get("program", {})
+    if not isinstance(program, dict):
+        return program
+    each, found, full = [*_by_program(source, rows).values()], {}, full_power(source, rows)
+    for key in dict.fromkeys(key for values in each for key in values):
+        values = [one.get(key) for one in each]
+        if all(value == values[0] for value in values) and (key != CURVE or full is None):
+            found[key] = values[0]
+        elif key == "gas_lead_s" and None in values:
+            lacks = rows[values.index(None)].place
+            said = f"expected gas_lead_s in every row in use, got none in {lacks}"
+            said += "; add it there, or write gas_lead_s in [program]"
+            raise refusal_at(path, ("process", "technique"), said)
+    if full is not None and None in (powers := [row.power_w for row in rows]):
+        lacks = rows[powers.index(None)].place
+        said = "expected power_w in every row in use, as the program sets the power of each, got "
+        said += f"none in {lacks}; add it there, or write power_by_speed in [program]"
+        raise refusal_at(path, ("process", "technique"), said)
+    return {**program, **found}
 
-    It does if its power follows the speed, all powers are known, and the job says nothing else.
+
+def full_power(source: Mapping[str, Any], rows: Sequence[RowTable]) -> float | None:
+    """Return the power (W) of which a program sets shares that differ with the techniques.
+
+    It is the largest of their rows. None if they have the same power, or the program sets none or
+    that of the job.
     """
-    follows = "power_by_speed" in program or all(row.power_by_speed is not None for row in rows)
-    said = {"pierce_time_s", "pierce_power", "pierce_stages"} & set(program)
-    return follows and not said and all(row.pierce_stages is not None for row in rows)
+    powers = {row.power_w for row in rows}
+    said = CURVE in source.get("program", {})
+    if said or len(powers) < 2 or not _names(source, "power_output"):
+        return None
+    return max(power for power in powers if power is not None)
+
+
+def _by_program(
+    source: Mapping[str, Any], rows: Sequence[JobRowTable]
+) -> dict[str, dict[str, Any]]:
+    """Return what the program sets by the row of each technique, by keys of [program].
+
+    Keys that [program] has are left out. The stages of pierces are set where the power follows the
+    speed, the powers of all of them are known, and the job says nothing else of the pierce.
+    """
+    program, full = source.get("program", {}), full_power(source, rows)
+    powered = _names(source, "power_output")
+    curves = full is not None or any(row.power_by_speed is not None for row in rows)
+    follows = powered and (CURVE in program or curves)
+    staged = follows and not {"pierce_time_s", "pierce_power", "pierce_stages"} & set(program)
+    staged = staged and all(row.pierce_stages is not None for row in rows if row.pierce)
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        values = found[row.technique] = {}
+        share = 1.0 if full is None or row.power_w is None else row.power_w / full
+        if staged and row.pierce_stages is not None:
+            stages = row.pierce_stages
+            values["pierce_stages"] = [[round(share * power, 6), time] for power, time in stages]
+        elif row.pierce and not {"pierce_time_s", "pierce_stages"} & set(program):
+            values["pierce_time_s"] = row.pierce_time
+        if _names(source, "gas_output") and "gas_lead_s" not in program:
+            values |= {} if row.gas_lead_s is None else {"gas_lead_s": row.gas_lead_s}
+        if powered and curves and CURVE not in program:
+            curve = row.power_by_speed or [[0.0, 1.0], [1.0, 1.0]]
+            values[CURVE] = [[speed, round(share * power, 6)] for speed, power in curve]
+    return found
+
+
+def contours_of(source: Mapping[str, Any]) -> dict[str, ProgramKeywords]:
+    """Return the options that each contour of a job has of its own in the program, by its name.
+
+    They are those that differ with the techniques; empty if none does. Before the drawing is read,
+    the loops of [contour.pick_all] are left out.
+    """
+    if "process" not in source:
+        return {}
+    process = ProcessTable.model_validate(source["process"])
+    own = _by_program(source, process.row)
+    if not any(own.values()):
+        return {}
+    cut_by = process.cut_by or {
+        name: contour.get("technique", process.technique)
+        for contour in source["contour"]
+        if (name := contour.get("name") or contour.get("pick"))
+    }
+    return {
+        name: ProgramKeywords(**{key.removesuffix("_s"): v for key, v in own[technique].items()})  # type: ignore[typeddict-item]  # of these keys
+        for name, technique in cut_by.items()
+    }
+
+
+def with_cuts(source: Mapping[str, Any], cut_by: Mapping[str, str]) -> Mapping[str, Any]:
+    """Return the tables of a job with the technique of each contour, if there are several."""
+    process = source.get("process", {})
+    if len(process.get("row", ())) < 2:
+        return source
+    return {**source, "process": {**process, "cut_by": dict(cut_by)}}
 
 
 def _names(source: Mapping[str, Any], output: str) -> bool:
@@ -232,10 +318,13 @@ def by_hand(
 ) -> Iterator[tuple[str, Any, str]]:
     """Yield key, value and words of what the operator sets for a row."""
     said = {"stand_off_mm": (source.get("cell") or {}).get("stand_off_mm", row.stand_off_mm)}
-    if "gas_lead_s" in source.get("program", {}):
+    program = {*source.get("program", {}), *_by_program(source, process.row)[row.technique]}
+    if "gas_lead_s" in program:
         said["gas_lead_s"] = None  # the program switches the gas
-    if "power_by_speed" in source.get("program", {}):
-        said["power_by_speed"] = None  # the program sets the power
+    if CURVE in program:
+        said[CURVE] = None  # the program sets the power
+    if (full := full_power(source, process.row)) is not None:
+        said["power_w"] = full
     for key, words in SHEET.items():
         value = said.get(key, getattr(row, key))
         if value is not None:
@@ -248,7 +337,7 @@ def by_hand(
     if row.micro_joint_mm and not joined:
         yield "micro_joint_mm", row.micro_joint_mm, f"micro joints {row.micro_joint_mm:g} mm"
     for number, stage in enumerate(row.pierce, 1):
-        words = stage_words(stage, by_program="pierce_stages" in source.get("program", {}))
+        words = stage_words(stage, by_program="pierce_stages" in program)
         if words:
             yield f"pierce {number}", stage.time_s, f"pierce {number}: {words}"
 
@@ -327,6 +416,8 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
         return ()
     written, process = tomllib.loads(text), ProcessTable.model_validate(source["process"])
     rows = {row.technique: row for row in process.row}
+    own_values = _by_program(source, process.row)
+    of_contours = {key for values in own_values.values() for key in values}
     found = []
     for own, table in zip(written["contour"], source["contour"], strict=True):
         row = rows[table.get("technique", process.technique)]
@@ -340,6 +431,8 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
         if "micro_joints" in table:
             inner = (own["micro_joints"], table["micro_joints"])
             found.append(_origin(name, "width_mm", *inner, row.place, None, under="micro_joints"))
+        for key, value in own_values[row.technique].items():
+            found.append(Origin(of=name, key=key, value=value, origin=row.place))
     place = ", ".join(row.place for row in process.row)
     power = [key for key in ("power_by_speed", "pierce_stages") if key in source.get("program", {})]
     program_keys = ("pierce_time_s", "gas_lead_s", *power)
@@ -347,6 +440,8 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
         if name == "cell" and name not in source:
             continue
         for key in keys:
+            if key in of_contours:
+                continue
             default = TABLES[name].model_fields[key].default
             inner = (written.get(name, {}), source.get(name, {}))
             found.append(_origin(name, key, *inner, place, default))

@@ -22,7 +22,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.faults import all_of, refusal, refusal_at
-from kerfpath.job.format.process import sheet_of, with_process
+from kerfpath.job.format.process import contours_of, sheet_of, with_process
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
@@ -291,7 +291,10 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         compensation=_compensation(path, file),
         most_moved=file.program.compensate_most_mm / 1000,
         program=file.program.resolve(
-            (copy_of or path).stem, file.audit.resolve().path, sheet_of(source)
+            (copy_of or path).stem,
+            file.audit.resolve().path,
+            sheet_of(source),
+            contours_of(source),
         ),
         source=source,
         text=text,

@@ -236,6 +236,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         "handshakes": bool(job.program.handshakes),
         "compensate": job.compensation is not None,
         "power_by_speed": job.program.power is not None,
+        "techniques with another pierce, gas or power": bool(job.program.contours),
         "acceleration_table from a file": table not in (None, "library"),
         "acceleration_table beside other accelerations": table is not None
         and {"acceleration_deg_s2", "acceleration_ratio"} & {*job.source["robot"]},

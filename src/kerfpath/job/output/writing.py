@@ -200,8 +200,9 @@ def process_times(job: Job, cut: CutResult) -> tuple[float, float, float | None]
     """
     assert cut.plan is not None
     took = float(cut.plan.time[-1] - cut.plan.time[0])
-    wait, gas = laser_start(job.program)[1], job.program.gas_lead
-    return took, job.program.pierce_time, None if gas is None else gas + wait + took
+    options = job.program.of(cut.contour)
+    wait, gas = laser_start(options)[1], options.gas_lead
+    return took, options.pierce_time, None if gas is None else gas + wait + took
 
 
 def process_notes(job: Job) -> list[str]:
@@ -280,7 +281,9 @@ def power_of(job: Job, cut: CutResult) -> PowerAlong | None:
 
     It is None, too, if the program cannot be made, which is reported when it is written.
     """
-    if cut.plan is None or job.program.power is None or job.program.language == "none":
+    if cut.plan is None or job.program.language == "none":
+        return None
+    if job.program.of(cut.contour).power is None:
         return None
     try:
         program = build_program([programmed(job, cut.plan, cut.as_run)], job.program)

@@ -110,7 +110,7 @@ def order_cuts(
             retract=job.program.retract,
             air_speed=job.program.air_speed or 1.0,
             approach_speed=job.program.approach_speed,
-            pierce_time=job.program.pierce_time,
+            pierce_time=job.program.pierce_times([r.task.name for r in requests]),
             seconds=job.sequence.seconds,
         )
     except StopEarly:

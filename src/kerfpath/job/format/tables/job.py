@@ -51,6 +51,7 @@ from kerfpath.post import (
     Await,
     LanguageSettings,
     Partner,
+    ProgramKeywords,
     ProgramOptions,
     Request,
     languages,
@@ -288,7 +289,11 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
         return _settings(self.language, (self.model_extra or {}).get(self.language, {}))
 
     def resolve(
-        self, stem: str, path_tolerance: float, remarks: Sequence[str] = ()
+        self,
+        stem: str,
+        path_tolerance: float,
+        remarks: Sequence[str] = (),
+        contours: Mapping[str, ProgramKeywords] | None = None,
     ) -> ProgramOptions:
         """Return the options of the program, in SI.
 
@@ -300,6 +305,8 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
             By which corners may be rounded without zone_error_mm.
         remarks : sequence of str
             Lines for the comment at the head of the program.
+        contours : mapping of str to dict, optional
+            Options that each contour has of its own.
         """
         stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
         stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
@@ -314,6 +321,7 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
             settings=self.settings(),
             handshakes=(*requests, *waits),
             remarks=tuple(remarks),
+            contours=contours or {},
             **values,
         )
 

@@ -202,3 +202,7 @@ class ProcessTable(CutTable):
         key("what to do with a thickness between two rows", '"linear"'),
     ] = "refuse"
     row: Annotated[tuple[JobRowTable, ...], Field(strict=False, max_length=MOST_ROWS)] = ()
+    cut_by: Annotated[
+        dict[str, Word] | None,
+        key("the technique of each contour, in a plan.json alone", '{ trim = "normal" }'),
+    ] = None

@@ -1,0 +1,221 @@
+"""Contours with techniques of their own: pierce, gas and power of each in programs, and audits."""
+
+from dataclasses import replace
+
+import pytest
+from benchmarks.program_edits import ACCELERATION, ARM, ARMS, JOB, Subject, _draw
+from tests.job.test_power import POWER, STEPS
+
+from kerfpath.errors import InputError
+from kerfpath.execution import with_power
+from kerfpath.job import Audit, program_from_file, run_job, write_result
+from kerfpath.post import ProgramOptions, ReadPower, ReadWait, build_program, languages
+
+PROCESS = """\
+[process]
+material = "steel"
+thickness_mm = 2
+[[process.row]]
+material = "steel"
+thickness_mm = 2
+speed_m_min = 4
+gas_lead_s = 0.3
+power_w = 3000
+power_by_speed = [[0.0, 0.3], [1.0, 1.0]]
+pierce = [{ time_s = 0.2, power_w = 1200 }, { time_s = 0.1, power_w = 2400 }]
+[[process.row]]
+material = "steel"
+thickness_mm = 2
+technique = "small-hole"
+speed_m_min = 3
+gas_lead_s = 0.2
+power_w = 1500
+pierce = [{ time_s = 0.15, power_w = 600 }]
+[[contour]]
+pick = "hole"
+technique = "small-hole"
+"""
+POWERED = [name for name in STEPS if name != "csv"]
+PLAIN = ["val3", "ros", "inform", "csv"]
+"""Languages that set no power in steps, and the table, whose settings name no output."""
+NOT_WRITTEN = {(name, "gas_lead") for name in ("fanuc", "val3", "linuxcnc", "inform")}
+"""Lead times that are not in the text: the gas is switched where a move begins."""
+
+
+def job_text(name):
+    arm, chosen = ARMS.get(name, ARM), languages()[name]
+    text = JOB.replace("gas_lead_s = 0.3\npierce_time_s = 0.25\n", "")
+    text = text.format(
+        arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900, language=name,
+        lead=0.01 if chosen.ahead else 0.0, more="", external="",
+    )  # fmt: skip
+    text = text.replace('[[contour]]\npick = "hole"\n', PROCESS, 1)
+    for each in POWERED:
+        text = text.replace(table := f"[program.{each}]\n", table + POWER[each])
+    return text
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """The job in each language, planned once for each robot, and its program."""
+    folder = tmp_path_factory.mktemp("techniques")
+    _draw(folder / "points.csv")
+    plans, found = {}, {}
+    for name in [*POWERED, *PLAIN]:
+        path = folder / f"{name}.toml"
+        path.write_text(job_text(name))
+        audit = Audit.of(path)
+        arm = ARMS.get(name, ARM)
+        if arm not in plans:
+            plans[arm] = run_job(audit.expected.job)
+        assert plans[arm].passed
+        found[name] = plans[arm], subject_of(audit, plans[arm].plans, audit.expected.job.program)
+    return found
+
+
+def subject_of(audit, plans, options):
+    chosen = languages()[options.language]
+    settings = chosen.completed(options.settings)
+    program = with_power(build_program(plans, options), options)
+    if chosen.sayable is not None:
+        program = chosen.sayable(program, settings)
+    return Subject(
+        audit=audit,
+        language=chosen,
+        settings=settings,
+        program=program,
+        files=chosen.formatter(program, settings).files(),
+    )
+
+
+@pytest.mark.parametrize("name", [*POWERED, *PLAIN])
+def test_each_contour_has_the_pierce_gas_and_power_of_its_technique(planned, name):
+    """Shares are those of the largest power of the rows; the job's audit passes."""
+    _, subject = planned[name]
+    options = subject.audit.expected.job.program
+    hole, slit = options.of("hole"), options.of("slit")
+    assert (hole.pierce_time, slit.pierce_time) == pytest.approx((0.15, 0.3))
+    if name in POWERED:
+        assert hole.pierce == ((0.2, 0.15),)
+        assert slit.pierce == ((0.4, 0.2), (0.8, 0.1))
+        assert (hole.power.full, slit.power.full) == (0.5, 1.0)
+    assert subject.outcome(subject.files) == ("passed", "")
+    waits = [
+        [step.time for step in section.steps if isinstance(step, ReadWait)]
+        for section in subject.read(subject.files).sections
+    ]
+    if waits := [each for each in waits if each]:
+        assert [sum(each) for each in waits] == pytest.approx([0.15, 0.3], abs=1e-3)
+    powers = [s.share for s in subject.read(subject.files).steps if isinstance(s, ReadPower)]
+    assert not powers or powers[0] == pytest.approx(0.2, abs=1e-3)
+    assert bool(powers) == (name in POWERED)
+
+
+@pytest.mark.parametrize("name", [*POWERED, *PLAIN])
+@pytest.mark.parametrize("what", ["pierce_time", "gas_lead", "power_by_speed"])
+def test_a_program_with_a_value_of_the_other_technique_does_not_pass(planned, name, what):
+    result, subject = planned[name]
+    options = subject.audit.expected.job.program
+    keys = ("pierce_time", "pierce_stages") if what == "pierce_time" else (what,)
+    hole, slit = (options.contours[each] for each in ("hole", "slit"))
+    if not {*keys} & {*hole}:
+        assert name in PLAIN
+        return
+    kept = {key: value for key, value in hole.items() if key not in keys}
+    other = kept | {key: value for key, value in slit.items() if key in keys}
+    changed = replace(options, contours={"hole": other, "slit": slit})
+    edited = subject_of(subject.audit, result.plans, changed)
+    if (name, what) in NOT_WRITTEN:
+        assert edited.files == subject.files
+    else:
+        assert subject.outcome(edited.files)[0] == "caught"
+
+
+@pytest.mark.parametrize("name", ["rapid", "fanuc"])
+def test_techniques_with_the_same_values_change_nothing(planned, tmp_path, name):
+    """The program is, letter by letter, that of a job that says the values itself."""
+    result, _ = planned[name]
+    _draw(tmp_path / "points.csv")
+    small = "gas_lead_s = 0.2\npower_w = 1500\npierce = [{ time_s = 0.15, power_w = 600 }]\n"
+    normal = PROCESS.partition("[[process.row]]\n")[2].partition("[[process.row]]\n")[0]
+    normal = normal.partition("gas_lead_s")
+    assert job_text(name).count(small) == 1
+    texts = {"alike": job_text(name).replace(small, normal[1] + normal[2])}
+    rows = texts["alike"].partition("[process]\n")[2].partition("[[contour]]")[0]
+    keys = "gas_lead_s = 0.3\npower_by_speed = [[0.0, 0.3], [1.0, 1.0]]\n"
+    keys += "pierce_stages = [[0.4, 0.2], [0.8, 0.1]]\n"
+    said = (
+        texts["alike"]
+        .replace(f"[process]\n{rows}", "")
+        .replace("\n[program]\n", f"\n[program]\n{keys}")
+    )
+    said = said.replace('technique = "small-hole"\n', "")
+    texts["said"] = said.replace('pick = "hole"\n', 'pick = "hole"\n', 1)
+    files = {}
+    for which, text in texts.items():
+        (tmp_path / f"{which}.toml").write_text(text)
+        audit = Audit.of(tmp_path / f"{which}.toml")
+        options = replace(audit.expected.job.program, remarks=())
+        assert options.contours == {}
+        files[which] = subject_of(audit, result.plans, options).files
+    assert files["alike"] == files["said"]
+
+
+def test_a_plan_has_the_techniques_for_programs_in_other_languages(planned, tmp_path):
+    result, subject = planned["rapid"]
+    write_result(result, tmp_path)
+    plan = tmp_path / "plan.json"
+    made, _ = program_from_file(plan, "krl")
+    assert "WAIT SEC 0.15" in "\n".join(made.values())
+    again, _ = program_from_file(tmp_path / "plan.json")
+    assert subject.outcome(again) == ("passed", "")
+
+
+def test_power_that_the_program_sets_is_not_to_be_set_by_hand(planned):
+    _, subject = planned["rapid"]
+    sheet = subject.audit.expected.job.program.remarks
+    assert sum("power 3000 W" in line for line in sheet) == 2
+    assert not any("1500" in line or "ROWS DIFFER" in line for line in sheet)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("gas_lead_s = 0.2\n", "", ["gas_lead_s in every row", "[program]"]),
+        ("power_w = 1500\n", "", ["power_w in every row", "power_by_speed in [program]"]),
+        (
+            "thickness_mm = 2\n[[",
+            "thickness_mm = 2\ncut_by = { hole = 'a' }\n[[",
+            ["cut_by", "remove"],
+        ),
+    ],
+)
+def test_rows_that_leave_a_value_open_are_refused_in_one_line(tmp_path, old, new, words):
+    _draw(tmp_path / "points.csv")
+    text = job_text("rapid")
+    assert old in text
+    (tmp_path / "job.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        Audit.of(tmp_path / "job.toml")
+    assert str(caught.value).isprintable()
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("contours", "words"),
+    [
+        ({"a": {"retract": 1.0}}, "'retract'"),
+        ({"a": {"gas_lead": 0.1}, "b": {}}, "gas_lead for every contour"),
+        ({"a": {"pierce_time": -1.0}, "b": {}}, "pierce_time"),
+    ],
+)
+def test_options_of_contours_are_checked(contours, words):
+    with pytest.raises(InputError, match=words):
+        ProgramOptions(contours=contours)
+
+
+def test_a_contour_without_options_among_others_is_refused():
+    options = ProgramOptions(contours={"a": {"pierce_time": 0.5}})
+    assert options.of("a, piece 1 of 2").pierce_time == 0.5
+    with pytest.raises(InputError, match="'b'"):
+        options.of("b")
