@@ -22,6 +22,7 @@ __all__ = [
     "back_off",
     "explain_collision",
     "least_time",
+    "least_times",
     "speed_share",
     "transfer_move",
 ]
@@ -258,6 +259,13 @@ def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> A
     return np.asarray(np.where(full, cross + gain / over, 2 * np.sqrt(gain)))
 
 
+def least_times(robot: Robot, q: Array, eta_v: float = 1.0, eta_a: float = 1.0) -> Array:
+    """Return when (m,) s the corners q (m, n) rad of a move can be reached at the earliest."""
+    velocity, acceleration = robot.speed_limits()
+    took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
+    return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
+
+
 def speed_share(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike, time: Array) -> Array:
     """Return the shares (B,) of full velocity at which motions dq (B, n) rad take times (B,) s.
 
@@ -312,14 +320,13 @@ def transfer_move(
         require_axes(cell.chain, robot)
     n = robot.joints
     ends = np.array([floats(q0, "q0", (n,)), floats(q1, "q1", (n,))])
-    velocity, acceleration = robot.speed_limits()
     lower, upper = _bounds(robot, ends)
     corners = ends
     if cell is not None:
         _require_clear(cell, ends)
         if not cell.clear_through(ends):
             found = find_way_around(
-                ends, lower, upper, 1 / velocity,
+                ends, lower, upper, 1 / robot.speed_limits()[0],
                 clear=lambda q: bool(cell.clear(q).all()), passable=cell.clear_through,
                 seconds=seconds,
             )  # fmt: skip
@@ -331,10 +338,9 @@ def transfer_move(
                     node=-1,
                 )
             corners = found
-    took = least_time(np.diff(corners, axis=0), eta_v * velocity, eta_a * acceleration)
     return TransferMove(
         q=freeze(corners),
-        time=freeze(np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])),
+        time=freeze(least_times(robot, corners, eta_v, eta_a)),
         clear=cell is not None,
     )
 

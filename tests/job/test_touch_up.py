@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -171,7 +172,7 @@ def touch(folder, text, *more, plan="out", name="edited.mod"):
 
 
 @pytest.mark.slow
-def test_taught_targets_are_kept_and_the_rest_is_planned_again(folder):
+def test_taught_targets_are_kept_and_so_is_every_contour_without_one(folder):
     text = (folder / "out/job.mod").read_text()
     hand = edited(text, "led_in", 21, (0.1, -0.2, 0.4))
     hand = edited(hand, "led_in", 24, (0, 0, 0.2), turn_deg=1.0).replace("0.250;", "0.300;", 1)
@@ -208,9 +209,16 @@ def test_taught_targets_are_kept_and_the_rest_is_planned_again(folder):
     assert list(after) == list(before)  # the order of cutting
     for name, was in before.items():
         assert set(after[name].posture) == set(was.posture)
-    for name in ("joined", "cornered"):  # as drawn, perhaps turned about the beam by up to 1 % more
-        np.testing.assert_allclose(after[name].points, before[name].points, atol=1e-9)
-        assert after[name].cost == pytest.approx(before[name].cost, rel=0.01)
+    assert {c["name"]: c["kept"] for c in found["contours"]} == {
+        "joined": True, "cornered": True, "led in": False,
+    }  # fmt: skip
+    for name in ("joined", "cornered"):
+        np.testing.assert_array_equal(after[name].q, before[name].q)
+        np.testing.assert_array_equal(after[name].time, before[name].time)
+    moves = [read_plan_file(folder / out / "plan.json").moves for out in ("out", "one")]
+    names = ["home", *before, "home"]
+    for leg, one, two in zip(pairwise(names), *moves, strict=True):
+        assert np.array_equal(one.q, two.q) == ("led in" not in leg)
     assert run("audit", folder / "one/plan.json").returncode == 0
 
 
@@ -227,10 +235,33 @@ def test_a_second_touch_up_keeps_the_first(folder):
         {p.name: p.contour for p in read_plan_file(folder / out / "plan.json").plans}
         for out in ("two", "three")
     )
-    np.testing.assert_allclose(three["led in"].points, two["led in"].points, atol=1e-12)
+    np.testing.assert_array_equal(three["led in"].points, two["led in"].points)
     assert np.abs(three["joined"].points - two["joined"].points).max() == pytest.approx(
         3e-4, rel=0.1
     )
+
+
+@pytest.mark.slow
+def test_contours_that_the_job_does_not_allow_any_more_are_planned_again(folder):
+    text = edited((folder / "out/job.mod").read_text(), "led_in", 21, (0, 0, 0.4))
+    (folder / "edited.mod").write_text(text)
+    slower = folder / "slower.toml"
+    changed = 'name = "cornered"\nspeed_m_min = 2.5\n'
+    slower.write_text(WHOLE.replace('name = "cornered"\nspeed_m_min = 3\n', changed))
+    result = run("touch-up", folder / "edited.mod", "--job", slower, "--plan",
+                 folder / "out/plan.json", "--out", folder / "slow", "--json")  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert [c["name"] for c in found["contours"] if c["kept"]] == ["joined"]
+    (said,) = found["renewed"]
+    assert said.startswith("cornered was planned again, as the job has changed: ")
+    before, after = (read_plan_file(folder / out / "plan.json").plans for out in ("out", "slow"))
+    for one, two in zip(before, after, strict=True):
+        if one.name == "cornered":
+            assert two.time[-1] == pytest.approx(one.time[-1] * 3 / 2.5, rel=0.05)
+            assert set(two.posture) == set(one.posture)
+        elif one.name == "joined":
+            np.testing.assert_array_equal(two.q, one.q)
 
 
 def many(text):

@@ -230,7 +230,7 @@ def _largest_tilt(cut: CutResult) -> float | None:
 
 
 def _cut_entry(cut: CutResult) -> dict[str, object]:
-    entry: dict[str, object] = {"name": cut.name, "passed": cut.passed}
+    entry: dict[str, object] = {"name": cut.name, "passed": cut.passed, "kept": bool(cut.kept)}
     entry |= {
         "length_m": cut.candidate.path.length,
         "nodes": len(cut.candidate.nodes),
@@ -341,10 +341,11 @@ def _path_error_entry(off: PathError) -> dict[str, object]:
 
 
 def _show_cuts(cuts: Sequence[CutResult]) -> None:
-    rows = []
+    rows, again = [], any(cut.kept for cut in cuts)
     for cut in cuts:
         row = [
             escape(cut.name),
+            *([("kept" if cut.kept else "new")] if again else ()),
             f"{cut.candidate.path.length * 1000:.1f}",
             str(len(cut.candidate.nodes)),
             f"{cut.request.task.speed * 60:g}",
@@ -371,11 +372,24 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "posture", "s", "run s", "off mm"]
+    columns = [
+        "contour",
+        *(["motion"] if again else ()),
+        "mm",
+        "nodes",
+        "m/min",
+        "posture",
+        "s",
+        "run s",
+        "off mm",
+    ]
     columns += ["grid", "cost"]
     columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
     spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s", "off mm"]
-    table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
+    numbers = [each for each in columns[1:-1] if each != "motion"]
+    table(columns, rows, numbers=numbers, whole=["motion", "audit"], spare=spare)
+    if again:
+        out.print("motion: kept as it was, joint by joint, or new: planned again")
     out.print(
         "run s: time from rest to rest, with rounded corners and every joint limit kept; "
         "off mm: largest distance of the executed tool tip from the path, "

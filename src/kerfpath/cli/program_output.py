@@ -585,12 +585,13 @@ def touch_up_program(program: Path, job: Path, plan: Path, folder: Path, ease_mm
     with progress_bars() as progress:
         done = touch_up(program, plan, job, ease=ease_mm / 1000, progress=progress)
     more = {"targets": [asdict(each) for each in done.targets], "not_kept": list(done.notes)}
+    more["renewed"] = list(done.renewed)
     for each in done.targets:
         out.print(
             f"{escape(each.place)}: {escape(each.contour)}, node {each.node}, moved by "
             f"{each.off * 1e3:.3f} mm, axis turned by {np.degrees(each.turned):.3f} deg"
         )
-    for note in merge_notes(done.notes):
+    for note in [*merge_notes(done.notes), *done.renewed]:
         out.print(f"note: {escape(note)}")
     finish_run(done.outcome, done.part, folder, more=more)
 

@@ -212,12 +212,12 @@ def touch_up(
     ] = 10.0,
     as_json: Json = False,
 ) -> None:
-    """Plan a job again around the targets that a person has moved in its program.
+    """Plan contours again around the targets that a person has moved in a program.
 
     Moved targets keep tip and tool axis as taught, and the path fades back to the planned one; the
-    rotation about the beam is planned again, in the posture of the plan. The files are those of
-    kerfpath plan and go to the folder PROGRAM-touched unless --out names another; the audit is
-    that of the touched-up path.
+    rotation about the beam is planned again, in the posture of the plan. All other contours keep
+    their motion; the table says which. The files are those of kerfpath plan and go to the folder
+    PROGRAM-touched unless --out names another; the audit is that of the touched-up path.
 
     Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2
     """

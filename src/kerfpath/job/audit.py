@@ -48,7 +48,6 @@ from kerfpath.job.expected import (
     expect_plans,
     expect_program,
     expect_sequence,
-    least_times,
     nodes_at_targets,
     recompute,
 )
@@ -92,7 +91,7 @@ from kerfpath.post import (
 )
 from kerfpath.robots import Robot
 from kerfpath.tolerances import SAME_POINT
-from kerfpath.transfer import End, TransferMove, back_off
+from kerfpath.transfer import End, TransferMove, back_off, least_times
 
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.

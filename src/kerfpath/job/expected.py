@@ -35,7 +35,7 @@ from kerfpath.retime import feed, retime
 from kerfpath.robots import Robot
 from kerfpath.sequence import Order, PartPlan
 from kerfpath.tolerances import SAME_PLACE
-from kerfpath.transfer import TransferMove, back_off, least_time
+from kerfpath.transfer import TransferMove, back_off, least_times
 from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------
@@ -442,13 +442,6 @@ def expect_sequence(
     )
     order = Order(candidates=candidates, duration=part.cycle_time, at_least=at_least)
     return replace(part, order=order)
-
-
-def least_times(robot: Robot, q: Array, eta_v: float = 1.0, eta_a: float = 1.0) -> Array:
-    """Return when (m,) s the corners q (m, n) rad of a move can be reached at the earliest."""
-    velocity, acceleration = robot.speed_limits()
-    took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
-    return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 
 
 # -----------------------------------------------------------------------------

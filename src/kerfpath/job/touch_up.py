@@ -1,8 +1,8 @@
-"""Plan a job again around targets of its program that a person has moved."""
+"""Plan contours again around targets that a person has moved in a program; the others are kept."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,11 +12,13 @@ from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.cad import Part
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
-from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
-from kerfpath.job.plan_file import PlanFile, read_plan_file
+from kerfpath.job.comparison import compare
+from kerfpath.job.expected import Expected, expect_plans
+from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, prepare, read_job
+from kerfpath.job.plan_file import PlanFile, plan_entry, read_plan_file
 from kerfpath.job.program_file import add_tips, in_language_of, program_on_disk
 from kerfpath.job.programs import expected_of_plans, program_of
-from kerfpath.job.run import JobResult, run_prepared
+from kerfpath.job.run import CutResult, JobResult, cut_as_before, run_again
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
 from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program
@@ -69,15 +71,19 @@ class TouchUp:
     ----------
     part : Part
     outcome : JobResult
+        Its cuts say which of them are `kept`.
     targets : tuple of MovedTarget
     notes : tuple of str
         Other changes in the program, which are not kept.
+    renewed : tuple of str
+        Why contours without moved targets were planned again, a line for each.
     """
 
     part: Part
     outcome: JobResult
     targets: tuple[MovedTarget, ...]
     notes: tuple[str, ...]
+    renewed: tuple[str, ...]
 
     __repr__ = short_repr
 
@@ -90,10 +96,12 @@ def touch_up(
     ease: float = 0.01,
     progress: Progress = no_progress,
 ) -> TouchUp:
-    """Plan a job again around the targets that were moved in its program.
+    """Plan contours again around the targets that were moved in a job's program.
 
     Moved nodes keep tip and axis as taught, and the path eases back to the planned one; the
-    rotation about the beam is planned again. Starts, directions, order and postures stay.
+    rotation about the beam is planned again. Starts, directions, order and postures stay. All
+    other contours keep their motion, joint by joint, and so do the moves between them. Where the
+    job does not allow it any more, they are planned again, too, and the result says why.
 
     Parameters
     ----------
@@ -129,21 +137,29 @@ def touch_up(
         for p, group in zip(file.plans, groups, strict=True)
     ]
     _require_few(program, targets, file.plans)
-    if job.sequence is not None:
-        job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
     prepared = prepare(job, part)
     requests = dict(zip(prepared.names, prepared.contours, strict=True))
     if set(requests) != set(file.contours.values()):
         raise InputError(
             f"{job.path}: the job has other contours than {file.path}; give the job of that plan"
         )
+    prepared = prepared.with_contours(
+        [replace(requests[p.name], candidates=(_planned(requests[p.name], p),)) for p in file.plans]
+    )
+    touched = {each[0].contour for each in targets if each}
+    kept, renewed = _keep(prepared, file, touched, progress)
     contours = [
-        _touched_up(requests[p.name], p, moved, group.path, ease)
-        for p, moved, group in zip(file.plans, targets, groups, strict=True)
+        request if p.name in kept else _again(request, p, moved, group.path, ease)
+        for request, p, moved, group in zip(
+            prepared.contours, file.plans, targets, groups, strict=True
+        )
     ]
-    outcome = run_prepared(prepared.with_contours(contours), progress=progress)
+    prepared = prepared.with_contours(contours)
+    outcome = run_again(prepared, file.plans, file.moves, kept, progress)
     found = tuple(target for moved in targets for target in moved)
-    return TouchUp(part=part, outcome=outcome, targets=found, notes=tuple(notes))
+    return TouchUp(
+        part=part, outcome=outcome, targets=found, notes=tuple(notes), renewed=tuple(renewed)
+    )
 
 
 def _require_kind(job: Job, file: PlanFile) -> None:
@@ -242,15 +258,46 @@ def _require_few(
                 )
 
 
-def _touched_up(
-    request: CutRequest,
-    p: Plan,
-    moved: Sequence[MovedTarget],
-    moves: Sequence[ReadMove],
+def _keep(
+    prepared: PreparedJob, file: PlanFile, touched: Collection[str], progress: Progress
+) -> tuple[dict[str, CutResult], list[str]]:
+    """Return the cuts that keep their motion, and why others without moved targets do not.
+
+    A motion is kept if it is what the job asks for, and passes its audit by the job as it is now.
+    """
+    kept, renewed, job = dict[str, CutResult](), list[str](), prepared.job
+    planned, _ = expect_plans(Expected.of(prepared), file)
+    for request, p, each in zip(prepared.contours, file.plans, planned, strict=True):
+        if p.name in touched:
+            continue
+        rows = [*each.checks]
+        if each.plan is not None:
+            entry = file.entries[p.name]
+            picked = p.name in file.picked
+            asked = plan_entry(
+                each.plan, p.name, (), picked=picked, certificate="certificate" in entry
+            )
+            asked["audit"] = entry["audit"]  # made again
+            rows += compare(asked["dt"], entry["dt"], of="the job", under=("dt",))
+            rows += compare(asked, entry, of="the job")
+            same = replace(p, robot=job.robot, T_flange_tip=job.tool, T_base_part=job.placement)
+            cut = cut_as_before(prepared, request, same, progress, picked=picked)
+            rows += [*cut.checks, *cut.as_run.checks]
+            if cut.passed and all(row.ok or row.level == "warning" for row in rows):
+                kept[p.name] = cut
+                continue
+        failed = next(row for row in rows if not row.ok and row.level == "error")
+        why = failed.title if failed.unit == "count" else failed.issue().message
+        renewed.append(f"{p.name} was planned again, as the job has changed: {why}")
+    return kept, renewed
+
+
+def _again(
+    request: CutRequest, p: Plan, moved: Sequence[MovedTarget], moves: Sequence[ReadMove],
     ease: float,
-) -> CutRequest:
+) -> CutRequest:  # fmt: skip
     """Return the request for a contour around its moved targets, in the postures of its plan."""
-    planned = _path_and_nodes(p, request)
+    (planned,) = request.candidates
     if moved:
         k = np.array([target.node for target in moved])
         T = np.array([moves[node].T_part_tip for node in k])
@@ -266,7 +313,7 @@ def _touched_up(
     )
 
 
-def _path_and_nodes(p: Plan, request: CutRequest) -> Candidate:
+def _planned(request: CutRequest, p: Plan) -> Candidate:
     """Return the candidate of a plan.
 
     For a plan that was touched up before, its path is straight lines between the plan's nodes.

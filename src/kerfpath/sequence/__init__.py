@@ -1,5 +1,7 @@
 """A part with many contours: their order, the start of each, and the transfer moves."""
 
+from kerfpath.sequence.kept import on_turns_of as on_turns_of
+from kerfpath.sequence.kept import rejoined as rejoined
 from kerfpath.sequence.order import Order as Order
 from kerfpath.sequence.order import best_order as best_order
 from kerfpath.sequence.order import inner_first as inner_first
@@ -11,3 +13,4 @@ from kerfpath.sequence.part import longest_search as longest_search
 from kerfpath.sequence.part import order_candidates as order_candidates
 from kerfpath.sequence.part import order_plans as order_plans
 from kerfpath.sequence.part import plan_part as plan_part
+from kerfpath.sequence.turned import turned as turned

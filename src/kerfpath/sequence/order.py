@@ -82,6 +82,18 @@ HOME = -1
 """Number that means home instead of a candidate."""
 
 
+def between_which(one: Plan | None, two: Plan | None) -> str:
+    """Return the ends of a move from a plan to another one in words; None is home."""
+    words = []
+    for made, end, node in ((one, "end", -1), (two, "start", 0)):
+        if made is None:
+            words.append("home")
+            continue
+        posture = posture_name(int(made.posture[node]))
+        words.append(f"the {end} of contour {made.name!r} in posture {posture}")
+    return f"from {words[0]} to {words[1]}"
+
+
 class MoveTimes:
     """Times of the transfer moves between candidates: a lower bound until a move is planned.
 
@@ -200,15 +212,7 @@ class MoveTimes:
 
     def between_which(self, leg: tuple[int, int]) -> str:
         """Return the ends of a move in words: the contours, and the postures there."""
-        words = []
-        for candidate, end, node in ((leg[0], "end", -1), (leg[1], "start", 0)):
-            if candidate == HOME:
-                words.append("home")
-                continue
-            made = self._plans[candidate]
-            posture = posture_name(int(made.posture[node]))
-            words.append(f"the {end} of contour {made.name!r} in posture {posture}")
-        return f"from {words[0]} to {words[1]}"
+        return between_which(*(None if c == HOME else self._plans[c] for c in leg))
 
     def _shut(self, leg: tuple[int, int]) -> None:
         """Forbid all moves of an end whose moves have failed often enough and never succeeded."""
@@ -289,7 +293,8 @@ class Order:
     duration : float s
         Time of those candidates and of the moves between them.
     at_least : float s
-        Lower bound: no order takes less. Equal to `duration` where the order is proved best.
+        Lower bound: no order takes less. Equal to `duration` where the order is proved best; 0
+        where it was kept from an earlier plan.
     """
 
     candidates: Ints

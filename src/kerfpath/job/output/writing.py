@@ -546,6 +546,12 @@ def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
 def order_note(part: PartPlan) -> str:
     """Return the note on the cycle time, and on what is proved about the order."""
     order = part.order
+    took = (
+        f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
+        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s"
+    )
+    if order.at_least == 0:
+        return f"{took}; the order was kept, no other was compared."
     proved = (
         "no order takes less"
         if order.optimal
@@ -559,10 +565,8 @@ def order_note(part: PartPlan) -> str:
     elif part.plans[0].settings.method == "continuous":
         rotations = "rotations about the beam that cost over 1 % more"
     return (
-        f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
-        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; with these candidates and "
-        f"moves {proved}. Each contour was planned in its best posture{common}; not compared: the "
-        f"other postures, and {rotations}."
+        f"{took}; with these candidates and moves {proved}. Each contour was planned in its best "
+        f"posture{common}; not compared: the other postures, and {rotations}."
     )
 
 

@@ -1,7 +1,9 @@
 """The run of a job: plan every contour, audit every plan, find the order of cutting."""
 
+from kerfpath.job.run.again import run_again as run_again
 from kerfpath.job.run.contour import advised as advised
 from kerfpath.job.run.contour import course_of_plans as course_of_plans
+from kerfpath.job.run.contour import cut_as_before as cut_as_before
 from kerfpath.job.run.contour import cut_candidate as cut_candidate
 from kerfpath.job.run.contour import moved_into_reach as moved_into_reach
 from kerfpath.job.run.doubts import sides_in_doubt as sides_in_doubt

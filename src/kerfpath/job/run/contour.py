@@ -253,6 +253,25 @@ def _without_plan(cut: CutResult) -> CutResult:
     )
 
 
+def cut_as_before(
+    prepared: PreparedJob, request: CutRequest, made: Plan, progress: Progress, *, picked: bool
+) -> CutResult:
+    """Return the cut of a contour with the motion of an earlier run, and its audit."""
+    candidate, name = request.candidates[0], request.task.name
+    job = replace(prepared.job, options=replace(request.options, certify=None))
+    external = None
+    if follows_courses(job.robot, request.task.asked(prepared.job.options)):
+        external = course_of_plans(job, candidate.nodes, [made])
+    progress(f"{name}: kept", 0, 0)
+    graph = job.graph(candidate.nodes, external=external)
+    whole = _whole(
+        job, request, candidate, graph, prepared.cell,
+        lambda what: progress(f"{name}: {what}", 0, 0),
+    )  # fmt: skip
+    cut = with_checks(prepared, replace(whole, kept="picked" if picked else "planned"), made)
+    return replace(cut, as_run=as_programmed(prepared.job, made, candidate.path, prepared.cell))
+
+
 def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[str, Remedy]:
     """Return the advice to move the part, by contour, for cuts that have nodes without poses."""
     far = {cut.contour: cut.request for cut in cuts if cut.lacks_poses and cut.advice is None}

@@ -250,9 +250,13 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
             tried.append(
                 [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )
-    result = order_cuts(prepared, tried, stoppable)
+    return finished(prepared, order_cuts(prepared, tried, stoppable), stoppable)
+
+
+def finished(prepared: PreparedJob, result: JobResult, progress: Progress) -> JobResult:
+    """Return the result with bounds, advice to move the part, and the departures of its nodes."""
     work = shared_work(result.cuts)
-    cuts = tuple(certified(cut, stoppable, work) for cut in result.cuts)
+    cuts = tuple(certified(cut, progress, work) for cut in result.cuts)
     moves = dict[str, Remedy]()
     with suppress(StopEarly):
         moves = moved_into_reach(prepared, cuts)
@@ -277,12 +281,12 @@ def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
 
 def shared_work(cuts: Sequence[CutResult]) -> SharedWork:
     """Return the work that the bounds of a job's cuts share."""
-    made = [cut.plan for cut in cuts if cut.plan is not None and cut.request.options.certify]
-    return SharedWork([len(one.q) for one in made])
+    asked = [cut for cut in cuts if cut.request.options.certify and not cut.kept]
+    return SharedWork([len(cut.plan.q) for cut in asked if cut.plan is not None])
 
 
 def certified(cut: CutResult, progress: Progress, work: SharedWork | None = None) -> CutResult:
-    """Return a cut with the bound of its plan, if one is asked for.
+    """Return a cut with the bound of its plan, if one is asked for; a motion that is kept has one.
 
     Its `work` may be shared with the bounds of other cuts. It is audited if plan.json is to keep
     its certificate.
@@ -295,7 +299,7 @@ def certified(cut: CutResult, progress: Progress, work: SharedWork | None = None
         share = f", {100 * done // total} %" if total else ""
         progress(f"{cut.name}: {what}{share}", 0, 0)
 
-    made = with_bound(cut.plan, asked, work=work, progress=named)
+    made = cut.plan if cut.kept else with_bound(cut.plan, asked, work=work, progress=named)
     if not asked.keep:
         return replace(cut, plan=made)
     named("audit of the certificate", 0, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.auditor import Check
@@ -50,6 +51,8 @@ class CutResult:
         How far the nodes leave the CAD curve; measured once the candidate is chosen.
     as_run : AsRun
         The plan as a controller runs its program, with rounded corners; not kept in plan files.
+    kept : {"", "planned", "picked"}
+        How the motion was found if it is that of an earlier run.
     """
 
     request: CutRequest
@@ -63,6 +66,7 @@ class CutResult:
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
     as_run: AsRun = field(default_factory=AsRun)
+    kept: Literal["", "planned", "picked"] = ""
 
     __repr__ = short_repr
 
@@ -79,7 +83,7 @@ class CutResult:
     @property
     def picked(self) -> bool:
         """Whether the plan is one of a Pareto set, with another objective than the job."""
-        return self.request.run is not None
+        return self.request.run is not None or self.kept == "picked"
 
     @property
     def lacks_poses(self) -> bool:
