@@ -6,9 +6,20 @@ import pytest
 from benchmarks.program_edits import ACCELERATION, ARM, ARMS, JOB, Subject, _draw
 from tests.job.test_power import POWER, STEPS
 
+from jobs import DEMO, SMALL
+from kerfpath.cli.plan_output import _cut_entry
 from kerfpath.errors import InputError
 from kerfpath.execution import with_power
-from kerfpath.job import Audit, program_from_file, run_job, write_result
+from kerfpath.job import (
+    Audit,
+    origins_of,
+    prepare,
+    program_from_file,
+    read_job,
+    run_job,
+    run_prepared,
+    write_result,
+)
 from kerfpath.post import ProgramOptions, ReadPower, ReadWait, build_program, languages
 
 PROCESS = """\
@@ -219,3 +230,110 @@ def test_a_contour_without_options_among_others_is_refused():
     assert options.of("a, piece 1 of 2").pierce_time == 0.5
     with pytest.raises(InputError, match="'b'"):
         options.of("b")
+
+
+# -----------------------------------------------------------------------------
+# Small holes have their technique by their size.
+
+BY_SIZE = 'technique = "small-hole"\nsmall_hole_mm = 12\n'
+
+
+def sized(folder, row=BY_SIZE, own="", more="", process=""):
+    """The job of two rows, the hole of 12 mm without a technique, prepared."""
+    _draw(folder / "points.csv")
+    head, _, tail = job_text("rapid").partition('[[contour]]\npick = "hole"\n')
+    head = head.replace('technique = "small-hole"\n', row)
+    head = head.replace("thickness_mm = 2\n[[", f"thickness_mm = 2\n{process}[[", 1)
+    tail = tail.replace('technique = "small-hole"\n', own).replace("speed_m_min = 3\n", "")
+    (folder / "job.toml").write_text(f'{head}[[contour]]\npick = "hole"\n{more}{tail}')
+    return prepare(read_job(folder / "job.toml"))
+
+
+def techniques(prepared):
+    return {request.task.name: request.task.technique for request in prepared.contours}
+
+
+def test_a_small_hole_is_cut_as_if_its_technique_was_named(tmp_path):
+    by_size = sized(tmp_path)
+    named = sized(tmp_path, own='technique = "small-hole"\n')
+    assert techniques(by_size) == {"hole": "small-hole (by size)", "slit": ""}
+    assert techniques(named) == {"hole": "small-hole", "slit": ""}
+    assert by_size.job.source == named.job.source
+    assert by_size.job.program.contours == named.job.program.contours
+    assert by_size.job.program.remarks == named.job.program.remarks
+    assert by_size.contours[0].task.speed == named.contours[0].task.speed == 3 / 60
+    again = prepare(by_size.job)
+    assert again.job.source == by_size.job.source
+
+
+@pytest.mark.parametrize(
+    ("how", "taken"),
+    [
+        ({}, True),
+        ({"row": BY_SIZE.replace("12", "11.9")}, False),
+        ({"row": BY_SIZE.replace("12", "11.9"), "process": "small_hole_mm = 12.1\n"}, True),
+        ({"process": "small_hole_mm = 11\n"}, False),
+        ({"process": "small_hole_mm = 0\n"}, False),
+        ({"row": 'technique = "small-hole"\n'}, False),
+        ({"row": 'technique = "small-hole"\n', "process": "small_hole_mm = 20\n"}, True),
+        ({"own": 'technique = "normal"\n'}, False),
+    ],
+)
+def test_the_size_of_the_job_or_chart_decides_and_a_technique_comes_before(tmp_path, how, taken):
+    prepared = sized(tmp_path, **how)
+    assert (techniques(prepared)["hole"] == "small-hole (by size)") == taken
+    assert prepared.job.program.of("hole").pierce_time == pytest.approx(0.15 if taken else 0.3)
+    assert techniques(prepared)["slit"] == "", "an open line is no hole"
+
+
+def test_the_technique_by_size_is_in_notes_report_json_and_passes_its_audit(tmp_path):
+    result = run_prepared(sized(tmp_path))
+    assert result.passed
+    written = write_result(result, tmp_path / "out")
+    assert any("hole: cut by the technique small-hole" in note for note in written.notes)
+    assert "small-hole (by size)" in (tmp_path / "out" / "report.html").read_text()
+    hole, slit = (_cut_entry(cut) for cut in result.cuts)
+    assert (hole["technique"], hole["technique_by_size"]) == ("small-hole", True)
+    assert (slit["technique"], slit["technique_by_size"]) == (None, False)
+    audit = Audit.of(tmp_path / "job.toml")
+    for name in ("plan.json", "job.mod"):
+        assert audit.audited(tmp_path / "out" / name).passed
+    sized(tmp_path, process="small_hole_mm = 0\n")
+    assert not Audit.of(tmp_path / "job.toml").audited(tmp_path / "out" / "job.mod").passed
+
+
+def test_loops_of_one_table_have_their_technique_each(tmp_path):
+    (tmp_path / "b_pillar.step").symlink_to(DEMO / "b_pillar.step")
+    rows = PROCESS.replace('technique = "small-hole"\n', BY_SIZE, 1).partition("[[contour]]")[0]
+    text = SMALL.partition("[[contour]]")[0] + rows.replace("gas_lead_s", "# gas_lead_s")
+    text += '[[contour]]\nspacing_mm = 1\n[contour.pick_all]\nkind = "inner"\nside = "outer"\n'
+    (tmp_path / "job.toml").write_text(text)
+    prepared = prepare(read_job(tmp_path / "job.toml"))
+    across = {loop.name: loop.diameter or 1.0 for loop in prepared.part.loops}
+    small = {name for name, taken in techniques(prepared).items() if taken}
+    assert small == {name for name in prepared.names if across[name] <= 0.012 + 1e-6}
+    assert 0 < len(small) < len(prepared.names)
+    job = prepared.job
+    assert set(job.source["process"]["small_holes"]) == small
+    assert {job.program.of(name).pierce_time for name in small} == {0.15}
+    sheet = " ".join(line[2:] for line in job.program.remarks)
+    assert all(name in sheet for name in small)
+    origins = {(each.of, each.key): each.value for each in origins_of(job.text, job.source)}
+    assert origins[f"{len(small)} small holes of several loops", "speed_m_min"] == 3
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"row": 'technique = "thin-web"\n', "process": "small_hole_mm = 9\n"},
+         ["process.small_hole_mm", "small-hole", "thin-web"]),
+        ({"row": 'technique = "thin-web"\nsmall_hole_mm = 9\n'}, ["small_hole_mm", "move it"]),
+        ({"process": "small_hole_mm = -1\n"}, ["small_hole_mm", "from 0 to 100"]),
+        ({"process": 'small_holes = ["hole"]\n'}, ["small_holes", "remove it"]),
+    ],
+)  # fmt: skip
+def test_sizes_that_cannot_be_are_refused_in_one_line(tmp_path, how, words):
+    with pytest.raises(InputError) as caught:
+        sized(tmp_path, **how)
+    assert str(caught.value).isprintable()
+    assert all(word in str(caught.value) for word in words), str(caught.value)

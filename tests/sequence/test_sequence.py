@@ -218,6 +218,20 @@ def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, pla
         np.testing.assert_allclose(move.q[-1], back_off(after, "start", 0.05), atol=1e-9)
 
 
+def test_each_contour_has_its_own_time_to_pierce(part, arm, tool, placement):
+    """The times go with the contours into the order, and are those of the contours between."""
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    rested, times = [rest(c) for c in part], (0.1, 0.2, 0.4, 0.8)
+    own = plan_part(rested, arm, pierce_time=times, **asked)
+    same = plan_part(rested, arm, pierce_time=0.2, **asked)
+    assert own.piercing_time == pytest.approx(1.5)
+    assert [own.pierce_time[k] for k in range(4)] == [times[i] for i, _ in own.chosen]
+    assert own.order.duration == pytest.approx(own.cycle_time, abs=1e-3)
+    assert own.chosen == same.chosen
+    between = own.rests[0, 3] - same.rests[0, 3]
+    assert between == pytest.approx(sum(own.pierce_time[1:3]) - 0.4)
+
+
 @pytest.mark.slow
 def test_a_part_in_one_posture_never_takes_less_time_than_the_free_one(part, arm, tool, placement):
     asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}

@@ -235,6 +235,8 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
         "length_m": cut.candidate.path.length,
         "nodes": len(cut.candidate.nodes),
         "speed_m_s": cut.request.task.speed,
+        "technique": cut.request.task.table.technique,
+        "technique_by_size": cut.request.task.by_size,
     }
     entry["departure"] = None if cut.departure is None else asdict(cut.departure)
     if cut.plan is None:
@@ -342,6 +344,7 @@ def _path_error_entry(off: PathError) -> dict[str, object]:
 
 def _show_cuts(cuts: Sequence[CutResult]) -> None:
     rows, again = [], any(cut.kept for cut in cuts)
+    techniques = any(cut.request.task.technique for cut in cuts)
     for cut in cuts:
         row = [
             escape(cut.name),
@@ -349,6 +352,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
             f"{cut.candidate.path.length * 1000:.1f}",
             str(len(cut.candidate.nodes)),
             f"{cut.request.task.speed * 60:g}",
+            *([escape(cut.request.task.technique or "-")] if techniques else []),
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
@@ -378,6 +382,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         "mm",
         "nodes",
         "m/min",
+        *(["technique"] if techniques else ()),
         "posture",
         "s",
         "run s",
@@ -386,7 +391,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
     columns += ["grid", "cost"]
     columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
     spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s", "off mm"]
-    numbers = [each for each in columns[1:-1] if each != "motion"]
+    numbers = [each for each in columns[1:-1] if each not in ("motion", "technique")]
     table(columns, rows, numbers=numbers, whole=["motion", "audit"], spare=spare)
     if again:
         out.print("motion: kept as it was, joint by joint, or new: planned again")

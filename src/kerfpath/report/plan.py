@@ -56,7 +56,7 @@ def render(
         Reasons not to cut the job although its contours are planned, and what to do.
     process : sequence of (of, key, value, origin, who sets it)
         Values of the process; empty without a chart.
-    times : sequence of (contour, s, s, s)
+    times : sequence of (contour, technique, s, s, s)
         Times for cutting, piercing and gas.
     **page
         As in `PageKeywords`; facts such as ("Robot", "ABB IRB 4600-60/2.05").

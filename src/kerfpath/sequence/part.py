@@ -224,7 +224,7 @@ class PartPlan:
     chosen: tuple[tuple[int, int], ...]
     retract: float
     approach_speed: float
-    pierce_time: float | tuple[float, ...]
+    pierce_time: float | Sequence[float]
 
     __repr__ = short_repr
 
@@ -243,7 +243,7 @@ class PartPlan:
     def piercing_time(self) -> float:
         """Time for piercing at all contours (s)."""
         each = self.pierce_time
-        return sum(each) if isinstance(each, tuple) else len(self.plans) * each
+        return sum(each) if isinstance(each, Sequence) else len(self.plans) * each
 
     @property
     def rests(self) -> Array:
@@ -252,7 +252,7 @@ class PartPlan:
         Its retract and the approach of the other are left out; the lower triangle is zero.
         """
         here = len(self.moves) - len(self.plans) + 1  # with a home, the first move comes from there
-        own = np.array([p.time[-1] - p.time[0] for p in self.plans]) + self.pierce_time
+        own = np.array([p.time[-1] - p.time[0] for p in self.plans]) + np.array(self.pierce_time)
         down_and_up = 2 * self.retract / self.approach_speed
         took = np.array([m.duration for m in self.moves[here // 2 :]][: len(self.plans) - 1])
         begin = np.append(0.0, np.cumsum(own[:-1] + down_and_up + took))

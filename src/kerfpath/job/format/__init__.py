@@ -47,6 +47,7 @@ from kerfpath.job.format.tables import LayoutTable as LayoutTable
 from kerfpath.job.format.tables import ProgramTable as ProgramTable
 from kerfpath.job.format.tables import RowTable as RowTable
 from kerfpath.job.format.tables import SequenceTable as SequenceTable
+from kerfpath.job.format.tables.process import SMALL_HOLE as SMALL_HOLE
 from kerfpath.job.format.tolerances import Tolerances as Tolerances
 from kerfpath.job.format.toml_file import toml_lines as toml_lines
 from kerfpath.job.format.toml_file import toml_value as toml_value

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.distance import pdist
 
 from kerfpath.arrays import Array, short_repr
-from kerfpath.cad import Part
+from kerfpath.cad import Loop, Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables import ContourTable
@@ -33,12 +34,15 @@ from kerfpath.operations import (
     start_at,
 )
 from kerfpath.options import PlanOptions
+from kerfpath.tolerances import SAME_PLACE
 from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------
 # Apply the operations of a [[contour]] table to a drawn loop.
 
 MM = 1e-3
+ROUNDED = 1e-3
+"""Share by which a hole may be larger than the size of small holes, for chords of its line."""
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
@@ -178,6 +182,10 @@ class ContourSpec:
         Distance between nodes that the job asks for, by which the speed is reduced at sharp edges.
     table : ContourTable
         The table in the file, with the operations on the loop before it is sampled.
+    small : ContourSpec, optional
+        How the loop is cut instead, if it is a hole of at most `small_size` (m).
+    by_size : bool
+        Whether this is how such a hole is cut.
     """
 
     pick: str
@@ -191,6 +199,9 @@ class ContourSpec:
     bend_ends: bool = False
     turn_step: float | None = None
     table: ContourTable
+    small: ContourSpec | None = None
+    small_size: float = 0.0
+    by_size: bool = False
 
     __repr__ = short_repr
 
@@ -203,11 +214,25 @@ class ContourSpec:
             The part has no such loop.
         """
         if self.table.pick_all is None:
-            return [replace(self, pick=part.loop(self.pick).name)]
+            loop = part.loop(self.pick)
+            return [replace(self._of_size(loop), pick=loop.name, name=self.name)]
         return [
-            replace(self, pick=loop.name, name=loop.name)
+            replace(self._of_size(loop), pick=loop.name, name=loop.name)
             for loop in self.table.pick_all.loops(part)
         ]
+
+    def _of_size(self, loop: Loop) -> ContourSpec:
+        """Return how a loop is cut: as a small hole if it is one.
+
+        Tables of points and tool paths do not tell holes from other closed contours.
+        """
+        hole = loop.kind == "inner" or (loop.kind == "outer" and loop.surface == "points")
+        if self.small is None or not hole:
+            return self
+        if np.ptp(loop.bounding_box, axis=0).max() > self.small_size + SAME_PLACE:
+            return self
+        across = float(pdist(loop.line(self.small_size * ROUNDED)).max())
+        return self.small if across <= self.small_size * (1 + ROUNDED) else self
 
     def drawn(self, part: Part) -> Contour:
         """Return the loop as drawn in the part.
@@ -298,6 +323,7 @@ class ContourSpec:
             name=self.name,
             bend_ends=self.bend_ends,
             turn_step=self.turn_step,
+            by_size=self.by_size,
         )
 
     def asked(self, options: PlanOptions) -> PlanOptions:
@@ -316,6 +342,12 @@ class ContourSpec:
             )
             for first, last, low, high in self.table.gamma_windows or ()
         )
+
+    @property
+    def technique(self) -> str:
+        """Its technique, and whether its size led to it; empty if the job names none for it."""
+        said = self.table.technique or ""
+        return f"{said} (by size)" if self.by_size else said
 
     @property
     def sampled_by(self) -> str:

@@ -20,8 +20,9 @@ from kerfpath.front import Subproblem
 from kerfpath.job.format.cell import cell_of_job
 from kerfpath.job.format.contour import ContourSpec
 from kerfpath.job.format.faults import all_of
-from kerfpath.job.format.process import contours_of, with_cuts
+from kerfpath.job.format.process import contours_of, sheet_of, with_cuts, with_small_holes
 from kerfpath.job.format.reading import Job
+from kerfpath.job.format.tables import ProgramTable
 from kerfpath.job.format.tables.process import NORMAL
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.operations import edge, nearest, quick_turns
@@ -314,11 +315,25 @@ def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> Pre
 
 def _with_techniques(job: Job, tasks: Sequence[ContourSpec]) -> Job:
     """Return the job with the options that its contours have by their techniques."""
-    normal = job.source.get("process", {}).get("technique", NORMAL)
+    normal, small = job.source.get("process", {}).get("technique", NORMAL), job.small_holes
     cut_by = {task.name: task.table.technique or normal for task in tasks}
-    source = with_cuts(job.source, cut_by)
-    program = replace(job.program, contours=contours_of(source))
-    return replace(job, source=source, program=program)
+    source, program = job.source, job.program
+    if small is not None and (taken := _small_holes(job, tasks)):
+        source = with_small_holes(job.path, job.text, source, small, taken)
+        table = ProgramTable.model_validate(source.get("program", {}))
+        program = table.resolve(program.name, job.tolerances.path, sheet_of(source))
+    source = with_cuts(source, cut_by)
+    return replace(job, source=source, program=replace(program, contours=contours_of(source)))
+
+
+def _small_holes(job: Job, tasks: Sequence[ContourSpec]) -> dict[int, list[str]]:
+    """Return the names of the small holes of each table that has one, by its number from 0."""
+    number = {id(spec.small.table): k for k, spec in enumerate(job.contours) if spec.small}
+    found: dict[int, list[str]] = {}
+    for task in tasks:
+        if task.by_size:
+            found.setdefault(number[id(task.table)], []).append(task.name)
+    return found
 
 
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:

@@ -27,6 +27,7 @@ from kerfpath.job.format.tables import (
     RowTable,
     StageTable,
 )
+from kerfpath.job.format.tables.process import NORMAL, SMALL_HOLE
 from kerfpath.post import ProgramKeywords, ProgramOptions
 
 LEADS = {"lead_in": "lead_in_mm", "lead_out": "lead_out_mm"}
@@ -94,9 +95,10 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
         process = _OnlyProcess.model_validate(source).process
     except ValidationError as error:
         raise refusal(path, text, error) from None
-    if process.cut_by is not None:
-        said = "expected technique in each [[contour]], got cut_by, which plan.json files have"
-        raise refusal_at(path, ("process", "cut_by"), f"{said}; remove it")
+    for key in ("cut_by", "small_holes"):
+        if getattr(process, key) is not None:
+            said = f"expected technique in each [[contour]], got {key}, which plan.json files have"
+            raise refusal_at(path, ("process", key), f"{said}; remove it")
     contours = source.get("contour")
     if not isinstance(contours, list) or not all(isinstance(one, dict) for one in contours):
         return source
@@ -120,19 +122,114 @@ def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any
         filled.append(_filled(contour, row))
     if faults:
         raise all_of(faults)
-    rows = list(chosen.values())
-    program = _alike(path, source, rows)
-    cell = source.get("cell")
+    return _with_rows(path, {**source, "contour": filled}, list(chosen.values()))
+
+
+def _with_rows(
+    path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]
+) -> dict[str, Any]:
+    """Return the tables of a job with rows, and what these have alike in [program] and [cell]."""
+    program, cell = _alike(path, source, rows), source.get("cell")
     if isinstance(cell, dict):
         cell = _once(path, source, "cell", {"stand_off_mm": [row.stand_off_mm for row in rows]})
     kept = [row.model_dump(mode="json", exclude_none=True, exclude_defaults=True) for row in rows]
     return {
         **source,
         "process": {**source["process"], "row": kept},
-        "contour": filled,
         **({"program": program} if program else {}),
         **({} if cell is None else {"cell": cell}),
     }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SmallHoles:
+    """How the holes up to a size are cut, where a job says nothing else.
+
+    Parameters
+    ----------
+    size : float m
+        Largest distance between two points of such a hole.
+    row : JobRowTable
+        The row of their technique.
+    tables : tuple of dict or None
+        The table of each contour with the values of this row; None for one with a technique.
+    """
+
+    size: float
+    row: JobRowTable
+    tables: tuple[dict[str, Any] | None, ...]
+
+    __repr__ = short_repr
+
+
+def small_holes_of(path: Path, text: str, source: Mapping[str, Any]) -> SmallHoles | None:
+    """Return how a job cuts small holes; None if no contour may be one, or no size is known.
+
+    `source` are its tables as `with_process` returns them, `text` is its file.
+
+    Raises
+    ------
+    InputError
+        The job gives a size, but there is no row for small holes.
+    """
+    if "process" not in source:
+        return None
+    process = ProcessTable.model_validate(source["process"])
+    written = tomllib.loads(text)
+    process = process.model_copy(
+        update={"row": ProcessTable.model_validate(written["process"]).row}
+    )
+    own = ["technique" in contour for contour in written["contour"]]
+    if process.technique != NORMAL or process.small_hole_mm == 0 or all(own):
+        return None
+    try:
+        row = choose(process, SMALL_HOLE, path.parent)
+    except NoRow as error:
+        if process.small_hole_mm is None:
+            return None
+        raise refusal_at(path, ("process", "small_hole_mm"), f"{error}") from None
+    size = process.small_hole_mm or row.small_hole_mm
+    if not size:
+        return None
+    return SmallHoles(
+        size=size / 1000,
+        row=row,
+        tables=tuple(
+            None if said else {**_filled(contour, row), "technique": SMALL_HOLE}
+            for said, contour in zip(own, written["contour"], strict=True)
+        ),
+    )
+
+
+def with_small_holes(
+    path: Path, text: str, source: Mapping[str, Any], small: SmallHoles,
+    taken: Mapping[int, Sequence[str]],
+) -> Mapping[str, Any]:  # fmt: skip
+    """Return the tables of a job with the technique of its small holes.
+
+    `taken` has the names of the small holes of each table with one.
+
+    Raises
+    ------
+    InputError
+        The rows of the techniques do not fit together.
+    """
+    written, process = tomllib.loads(text), ProcessTable.model_validate(source["process"])
+    contours, several = list(source["contour"]), list[str]()
+    for number, names in taken.items():
+        if "pick_all" in contours[number]:
+            several += names
+        else:
+            contours[number] = small.tables[number]
+    by_technique = {row.technique: row for row in (*process.row, small.row)}
+    used = [contour.get("technique", process.technique) for contour in contours]
+    rows = [by_technique[technique] for technique in dict.fromkeys([*used, SMALL_HOLE])]
+    own = {key: value for key, value in source.items() if key not in ("program", "cell")}
+    own |= {key: written[key] for key in ("program", "cell") if key in written}
+    found = _with_rows(path, {**own, "contour": contours}, rows)
+    if several:
+        found["process"] = {**found["process"], "small_holes": several}
+    return found
 
 
 def _filled(contour: Mapping[str, Any], row: RowTable) -> dict[str, Any]:
@@ -298,10 +395,12 @@ def sheet_of(source: Mapping[str, Any]) -> tuple[str, ...]:
     lines = [TITLE]
     several = len(process.row) > 1
     for row in process.row:
+        if not (cut := _cut_by(source, process, row)):
+            continue  # all of its contours are small holes
         words = (row.material, f"{row.thickness_mm:g} mm", row.gas, row.quality, row.technique)
         lines.append(" ".join(word for word in words if word))
         lines += [EXAMPLE] if row.example else []
-        lines += [f"for {', '.join(_cut_by(source, process, row))}"] if several else []
+        lines += [f"for {', '.join(cut)}"] if several else []
         lines += [f"machine: {row.machine}"] if row.machine else []
         lines += [words for _, _, words in by_hand(source, process, row)]
     if several and any(len(each) > 1 for each in _alone(source, process)):
@@ -367,7 +466,8 @@ def _alone(source: Mapping[str, Any], process: ProcessTable) -> list[set[str]]:
 
 def _cut_by(source: Mapping[str, Any], process: ProcessTable, row: JobRowTable) -> list[str]:
     """Return the names of the contours that a row is for."""
-    return [
+    small = [*(process.small_holes or ())] if row.technique == SMALL_HOLE else []
+    return small + [
         str(contour.get("name") or contour.get("pick") or "several loops")
         for contour in source["contour"]
         if contour.get("technique", process.technique) == row.technique
@@ -433,6 +533,12 @@ def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
             found.append(_origin(name, "width_mm", *inner, row.place, None, under="micro_joints"))
         for key, value in own_values[row.technique].items():
             found.append(Origin(of=name, key=key, value=value, origin=row.place))
+    if process.small_holes:
+        row, of = rows[SMALL_HOLE], f"{len(process.small_holes)} small holes of several loops"
+        keys = ("speed_m_min", "kerf_mm", *LEADS.values())
+        values = {key: getattr(row, key) for key in keys} | own_values[SMALL_HOLE]
+        for key, value in values.items():
+            found.append(Origin(of=of, key=key, value=value, origin=row.place))
     place = ", ".join(row.place for row in process.row)
     power = [key for key in ("power_by_speed", "pierce_stages") if key in source.get("program", {})]
     program_keys = ("pierce_time_s", "gas_lead_s", *power)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,10 +22,17 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.faults import all_of, refusal, refusal_at
-from kerfpath.job.format.process import contours_of, sheet_of, with_process
+from kerfpath.job.format.process import (
+    SmallHoles,
+    contours_of,
+    sheet_of,
+    small_holes_of,
+    with_process,
+)
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
+    ContourTable,
     ExternalTable,
     JobFile,
     LayoutTable,
@@ -97,6 +104,8 @@ class Job:
         Whether a program may lack contours that have no path.
     switched_off : tuple of str
         Names of contours that are not cut.
+    small_holes : SmallHoles or None
+        How holes up to a size are cut, if not as their contour says.
     """
 
     path: Path
@@ -120,6 +129,7 @@ class Job:
     text: str = ""
     accepts_incomplete: bool = False
     switched_off: tuple[str, ...] = ()
+    small_holes: SmallHoles | None = None
 
     __repr__ = short_repr
 
@@ -273,13 +283,14 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
     except OptionConflict as conflict:
         raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
     drawing = file.part.drawing(path.parent)
+    small = small_holes_of(path, text, source)
     return Job(
         path=path,
         robot=robot,
         tool=file.tool.resolve(),
         placement=file.part.resolve(drawing),
         drawing=drawing,
-        contours=tuple(contour_request(table) for table in file.contour),
+        contours=_requests(path, file, small),
         options=options,
         cell=file.cell,
         home=home_of(file.sequence, file.robot.external, robot),
@@ -300,7 +311,29 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         text=text,
         accepts_incomplete=file.program.incomplete == "accept",
         switched_off=file.part.switched_off,
+        small_holes=small,
     )
+
+
+def _requests(path: Path, file: JobFile, small: SmallHoles | None) -> tuple[ContourSpec, ...]:
+    """Return what each [[contour]] asks for, and how it is cut if it is a small hole."""
+    asked = tuple(contour_request(table) for table in file.contour)
+    if small is None:
+        return asked
+    found = []
+    for number, (spec, own) in enumerate(zip(asked, small.tables, strict=True)):
+        if own is None:
+            found.append(spec)
+            continue
+        try:
+            other = contour_request(ContourTable.model_validate(own))
+        except ValidationError as error:
+            said = error.errors(include_url=False)[0]["msg"]
+            said = f"with the values of {small.row.place} for small holes: {said}"
+            raise refusal_at(path, ("contour", number), said) from None
+        other = replace(other, by_size=True)
+        found.append(replace(spec, small=other, small_size=small.size))
+    return tuple(found)
 
 
 def _compensation(path: Path, file: JobFile) -> Literal["model"] | Correction | None:

@@ -19,7 +19,7 @@ from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.compensated import compensation_notes, programmed
-from kerfpath.job.format import DIFFER, Job, origins_of, refusal_at
+from kerfpath.job.format import DIFFER, SMALL_HOLE, Job, origins_of, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
@@ -180,8 +180,8 @@ def _process_rows(job: Job) -> list[tuple[str, str, str, str, str]]:
     ]
 
 
-def _process_times(outcome: JobResult) -> list[tuple[str, str, str, str]]:
-    """Return the times of each contour of a job with [process]: cutting, piercing, gas."""
+def _process_times(outcome: JobResult) -> list[tuple[str, str, str, str, str]]:
+    """Return technique and times (cutting, piercing, gas) of the contours, with [process]."""
     if "process" not in outcome.job.source:
         return []
     found = []
@@ -189,7 +189,8 @@ def _process_times(outcome: JobResult) -> list[tuple[str, str, str, str]]:
         if cut.plan is not None:
             took, pierced, gas = process_times(outcome.job, cut)
             shown = "-" if gas is None else f"{gas:.2f}"
-            found.append((cut.name, f"{took:.2f}", f"{pierced:.2f}", shown))
+            technique = cut.request.task.technique or "-"
+            found.append((cut.name, technique, f"{took:.2f}", f"{pierced:.2f}", shown))
     return found
 
 
@@ -219,6 +220,19 @@ def process_notes(job: Job) -> list[str]:
             "(switched_off in [part]), or stop between them."
         )
     return notes
+
+
+def small_hole_notes(outcome: JobResult) -> list[str]:
+    """Return the note on contours that are cut by another technique because of their size."""
+    names = [cut.contour for cut in outcome.cuts if cut.request.task.by_size]
+    small = outcome.job.small_holes
+    if not names or small is None:
+        return []
+    return [
+        f"{', '.join(dict.fromkeys(names))}: cut by the technique {SMALL_HOLE} "
+        f"({small.row.place}), as holes of at most {small.size * 1e3:g} mm; a technique in "
+        "[[contour]] comes before, and small_hole_mm = 0 in [process] switches this off."
+    ]
 
 
 def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
@@ -476,7 +490,12 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     notes += [] if part is None else [order_note(part)]
     contours = {cut.contour: cut.candidate.nodes for cut in outcome.cuts}
     notes += sides_in_doubt(job, contours.items(), outcome.mesh)
-    notes += process_notes(job) + closer_sampling(outcome) + short_pieces(outcome)
+    notes += (
+        process_notes(job)
+        + small_hole_notes(outcome)
+        + closer_sampling(outcome)
+        + short_pieces(outcome)
+    )
     notes += compensation_notes(job, [(cut.name, cut.as_run) for cut in outcome.cuts])
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]

@@ -130,7 +130,7 @@ def _with_moves(
         retract=job.program.retract,
         air_speed=job.program.air_speed or 1.0,
         approach_speed=job.program.approach_speed,
-        pierce_time=job.program.pierce_time,
+        pierce_time=job.program.pierce_times([cut.name for cut in cuts]),
         seconds=seconds,
     )
     return replace(result, part=part, air=tuple(worst_of(map(checks, part.moves))))

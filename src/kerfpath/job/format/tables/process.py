@@ -22,6 +22,8 @@ from kerfpath.post import power_curve
 
 NORMAL = "normal"
 """The technique of a row, or of a job, that names none."""
+SMALL_HOLE = "small-hole"
+"""The technique that holes up to a size have by themselves."""
 LONGEST_WORD = 40
 """Most characters of a word that rows are chosen by: it stands in comments of programs."""
 MOST_ROWS = 10_000
@@ -47,6 +49,7 @@ Technique = Annotated[
 Material = Annotated[Word, key("a material, as charts call it", '"mild steel"')]
 Gas = Annotated[Word | None, key("a gas, as charts call it", '"N2"')]
 Quality = Annotated[Word | None, key("a quality, as charts call it", '"fine"')]
+Size = Annotated[NotNegative | None, key("a number from 0 to 100, in mm", "8", le=100)]
 Thickness = Annotated[Positive, key("a number above 0, at most 500, in mm", "3", le=500)]
 
 
@@ -119,11 +122,22 @@ class RowTable(CutTable):
     voltage_v: Annotated[Positive | None, key("a number above 0, in V", "128")] = None
     pause_at_end_s: Seconds = None
     note: Annotated[Text | None, key("a remark", '"mirror side up"')] = None
+    small_hole_mm: Size = None
     pierce: Annotated[
         tuple[StageTable, ...],
         Field(strict=False, max_length=20),
         key("a list of stages", "[{ time_s = 0.2, power_w = 1500 }]"),
     ] = ()
+
+    @model_validator(mode="after")
+    def _size_of_small_holes(self) -> RowTable:
+        if self.small_hole_mm is not None and self.technique != SMALL_HOLE:
+            expected, remedy = (
+                f'small_hole_mm in a row of technique "{SMALL_HOLE}"',
+                "move it there",
+            )
+            raise fault(expected, f'it with "{self.technique}"', remedy, ("small_hole_mm",))
+        return self
 
     @property
     def chosen_by(self) -> tuple[str, float, str, str, str]:
@@ -201,7 +215,13 @@ class ProcessTable(CutTable):
         Literal["refuse", "linear"],
         key("what to do with a thickness between two rows", '"linear"'),
     ] = "refuse"
+    small_hole_mm: Size = None
     row: Annotated[tuple[JobRowTable, ...], Field(strict=False, max_length=MOST_ROWS)] = ()
+    small_holes: Annotated[
+        tuple[Text, ...] | None,
+        Field(strict=False),
+        key("the names of holes of [contour.pick_all] by size, in a plan.json alone", '["hole1"]'),
+    ] = None
     cut_by: Annotated[
         dict[str, Word] | None,
         key("the technique of each contour, in a plan.json alone", '{ trim = "normal" }'),
