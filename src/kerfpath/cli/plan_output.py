@@ -36,13 +36,16 @@ from kerfpath.job import (
     origins_of,
     power_of,
     prepare,
-    process_times,
     read_job,
     require_foreseen,
     require_language,
     require_place,
     run_prepared,
     sequence_entry,
+    spent_entry,
+    spent_on,
+    spent_on_all,
+    spent_table,
     with_map,
     write_result,
 )
@@ -178,6 +181,7 @@ def finish_run(
             "drawing": drawing_entry(part),
             "contours": [_cut_entry(cut) | _times_entry(outcome.job, cut) for cut in outcome.cuts],
             "process": _process_entry(outcome.job),
+            "spent": _spent_entry(outcome),
             "sequence": None if outcome.part is None else sequence_entry(outcome.part),
             "files": [str(f) for f in written.files],
             "removed": [str(f) for f in written.removed],
@@ -187,6 +191,7 @@ def finish_run(
         }
     )
     _show_cuts(outcome.cuts)
+    _show_spent(outcome)
     names = [cut.name for cut in outcome.cuts]
     names += identifiers(names, ())  # as in programs
     warnings: list[str] = []
@@ -273,8 +278,22 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
 def _times_entry(job: Job, cut: CutResult) -> dict[str, object]:
     if cut.plan is None:
         return {}
-    _, pierced, gas = process_times(job, cut)
-    return {"piercing_s": pierced, "gas_s": gas, "power": _power_entry(job, cut)}
+    return spent_entry(spent_on(job, cut)) | {"power": _power_entry(job, cut)}
+
+
+def _spent_entry(outcome: JobResult) -> dict[str, object]:
+    spent = spent_on_all(outcome)
+    return {"cutting_s": spent.cutting, "moves_s": spent.air} | spent_entry(spent)
+
+
+def _show_spent(outcome: JobResult) -> None:
+    heads, rows = spent_table(outcome)
+    if rows:
+        columns = [f"{name} {unit}".strip().lower() for name, unit in heads]
+        columns = [
+            name.replace(unit.lower(), unit) for name, (_, unit) in zip(columns, heads, strict=True)
+        ]
+        table(columns, [[escape(cell) for cell in row] for row in rows], numbers=columns[2:])
 
 
 def _power_entry(job: Job, cut: CutResult) -> dict[str, object] | None:

@@ -59,7 +59,6 @@ from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text
 from kerfpath.job.output import power_of as power_of
-from kerfpath.job.output import process_times as process_times
 from kerfpath.job.output import program_places as program_places
 from kerfpath.job.output import program_texts as program_texts
 from kerfpath.job.output import python_script as python_script
@@ -68,6 +67,10 @@ from kerfpath.job.output import require_language as require_language
 from kerfpath.job.output import require_place as require_place
 from kerfpath.job.output import result_texts as result_texts
 from kerfpath.job.output import script_refusal as script_refusal
+from kerfpath.job.output import spent_entry as spent_entry
+from kerfpath.job.output import spent_on as spent_on
+from kerfpath.job.output import spent_on_all as spent_on_all
+from kerfpath.job.output import spent_table as spent_table
 from kerfpath.job.output import stale_program as stale_program
 from kerfpath.job.output import write_result as write_result
 from kerfpath.job.plan_file import PlanFile as PlanFile

@@ -99,7 +99,7 @@ DISTANCE = 1e-6
 """Accuracy of distances between convex solids, m; those of a record may differ by it."""
 SHOWN = 60
 """Most characters of a value that a message shows."""
-PROGRAM = ("program", "audit", "layout", "process")
+PROGRAM = ("program", "audit", "layout", "process", "cost")
 """Tables of a job that do not define the motion."""
 
 

@@ -35,7 +35,7 @@ def render(
     moves: Sequence[ArrayLike] = (),
     faults: Sequence[str] = (),
     process: Sequence[Sequence[str]] = (),
-    times: Sequence[Sequence[str]] = (),
+    spent: tuple[Sequence[tuple[str, str]], Sequence[Sequence[str]]] = ((), ()),
     **page: Unpack[PageKeywords],
 ) -> str:
     """Return the report as one self-contained HTML page; the same input gives the same text.
@@ -56,8 +56,8 @@ def render(
         Reasons not to cut the job although its contours are planned, and what to do.
     process : sequence of (of, key, value, origin, who sets it)
         Values of the process; empty without a chart.
-    times : sequence of (contour, technique, s, s, s)
-        Times for cutting, piercing and gas.
+    spent : (sequence of (str, str), sequence of sequence of str)
+        Columns, by name and unit, and rows of what each contour takes.
     **page
         As in `PageKeywords`; facts such as ("Robot", "ABB IRB 4600-60/2.05").
     """
@@ -73,7 +73,7 @@ def render(
         other_failures=len(failed[MOST_STEPS:]),
         faults=faults,
         process=process,
-        times=times,
+        spent=spent,
         sections=sections,
         open_contour=failed[0][0] if failed else 1,
         scene=scene(sections, mesh, cell, moves),

@@ -26,6 +26,7 @@ from kerfpath.job.format.process import DIFFER as DIFFER
 from kerfpath.job.format.process import TITLE as TITLE
 from kerfpath.job.format.process import Origin as Origin
 from kerfpath.job.format.process import contours_of as contours_of
+from kerfpath.job.format.process import full_power as full_power
 from kerfpath.job.format.process import origins_of as origins_of
 from kerfpath.job.format.process import row_words as row_words
 from kerfpath.job.format.process import sheet_of as sheet_of
@@ -40,10 +41,13 @@ from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable
 from kerfpath.job.format.tables import ChartFile as ChartFile
 from kerfpath.job.format.tables import ContourTable as ContourTable
+from kerfpath.job.format.tables import CostTable as CostTable
 from kerfpath.job.format.tables import ExternalTable as ExternalTable
 from kerfpath.job.format.tables import Goal as Goal
 from kerfpath.job.format.tables import JobFile as JobFile
+from kerfpath.job.format.tables import JobRowTable as JobRowTable
 from kerfpath.job.format.tables import LayoutTable as LayoutTable
+from kerfpath.job.format.tables import ProcessTable as ProcessTable
 from kerfpath.job.format.tables import ProgramTable as ProgramTable
 from kerfpath.job.format.tables import RowTable as RowTable
 from kerfpath.job.format.tables import SequenceTable as SequenceTable

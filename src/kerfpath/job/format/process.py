@@ -22,6 +22,7 @@ from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.tables import (
     TABLES,
     ContourTable,
+    CostTable,
     JobRowTable,
     ProcessTable,
     RowTable,
@@ -139,6 +140,15 @@ def _with_rows(
         **({"program": program} if program else {}),
         **({} if cell is None else {"cell": cell}),
     }
+
+
+def require_prices(path: Path, cost: CostTable, rows: Sequence[JobRowTable]) -> None:
+    """Raise InputError unless rows have all that the prices of a job need."""
+    for row in rows:
+        if (lacks := cost.lacks(row)) is not None:
+            key, what = lacks
+            said = f"expected {what} in {row.place}, got none; add it, or remove {key}"
+            raise refusal_at(path, ("cost", key), said)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -444,7 +454,7 @@ def by_hand(
 def row_words(row: RowTable) -> str:
     """Return the values of a row beside speed and kerf in words."""
     more = {"lead_in_mm": "lead-in {:g} mm", "lead_out_mm": "lead-out {:g} mm"}
-    more |= {"micro_joint_mm": "micro joints {:g} mm"} | SHEET
+    more |= {"micro_joint_mm": "micro joints {:g} mm", "gas_flow_l_min": "gas {:g} l/min"} | SHEET
     said = [words.format(getattr(row, key)) for key, words in more.items() if getattr(row, key)]
     return ", ".join([*said, *(f"pierce {stage_words(stage)}" for stage in row.pierce)])
 

@@ -25,6 +25,7 @@ from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.process import (
     SmallHoles,
     contours_of,
+    require_prices,
     sheet_of,
     small_holes_of,
     with_process,
@@ -33,6 +34,7 @@ from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
     ContourTable,
+    CostTable,
     ExternalTable,
     JobFile,
     LayoutTable,
@@ -106,6 +108,8 @@ class Job:
         Names of contours that are not cut.
     small_holes : SmallHoles or None
         How holes up to a size are cut, if not as their contour says.
+    cost : CostTable or None
+        Prices.
     """
 
     path: Path
@@ -130,6 +134,7 @@ class Job:
     accepts_incomplete: bool = False
     switched_off: tuple[str, ...] = ()
     small_holes: SmallHoles | None = None
+    cost: CostTable | None = None
 
     __repr__ = short_repr
 
@@ -284,6 +289,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
     drawing = file.part.drawing(path.parent)
     small = small_holes_of(path, text, source)
+    if file.cost is not None and file.process is not None:
+        require_prices(path, file.cost, [*file.process.row, *([small.row] if small else [])])
     return Job(
         path=path,
         robot=robot,
@@ -312,6 +319,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         accepts_incomplete=file.program.incomplete == "accept",
         switched_off=file.part.switched_off,
         small_holes=small,
+        cost=file.cost,
     )
 
 

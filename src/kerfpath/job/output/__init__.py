@@ -2,13 +2,16 @@
 
 from kerfpath.job.output.script import python_script as python_script
 from kerfpath.job.output.script import script_refusal as script_refusal
+from kerfpath.job.output.spent import power_of as power_of
+from kerfpath.job.output.spent import spent_entry as spent_entry
+from kerfpath.job.output.spent import spent_on as spent_on
+from kerfpath.job.output.spent import spent_on_all as spent_on_all
+from kerfpath.job.output.spent import spent_table as spent_table
 from kerfpath.job.output.writing import FileTexts as FileTexts
 from kerfpath.job.output.writing import ProgramPlaces as ProgramPlaces
 from kerfpath.job.output.writing import WrittenFiles as WrittenFiles
 from kerfpath.job.output.writing import make_folder as make_folder
 from kerfpath.job.output.writing import plan_file_text as plan_file_text
-from kerfpath.job.output.writing import power_of as power_of
-from kerfpath.job.output.writing import process_times as process_times
 from kerfpath.job.output.writing import program_places as program_places
 from kerfpath.job.output.writing import program_texts as program_texts
 from kerfpath.job.output.writing import require_folder as require_folder

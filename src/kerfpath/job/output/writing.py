@@ -14,12 +14,13 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
-from kerfpath.execution import PowerAlong, power_along, with_power
+from kerfpath.execution import with_power
 from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
-from kerfpath.job.compensated import compensation_notes, programmed
+from kerfpath.job.compensated import compensation_notes
 from kerfpath.job.format import DIFFER, SMALL_HOLE, Job, origins_of, refusal_at
+from kerfpath.job.output.spent import power_of, spent_table
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
@@ -38,7 +39,6 @@ from kerfpath.post import (
     TimedLine,
     build_program,
     issue_lines,
-    laser_start,
     preflight,
     read_program,
     replace_program,
@@ -160,7 +160,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         facts=facts,
         faults=faults,
         process=_process_rows(job),
-        times=_process_times(outcome),
+        spent=spent_table(outcome),
         notes=notes,
         job_text=job.text,
     )
@@ -178,32 +178,6 @@ def _process_rows(job: Job) -> list[tuple[str, str, str, str, str]]:
         )
         for each in origins_of(job.text, job.source)
     ]
-
-
-def _process_times(outcome: JobResult) -> list[tuple[str, str, str, str, str]]:
-    """Return technique and times (cutting, piercing, gas) of the contours, with [process]."""
-    if "process" not in outcome.job.source:
-        return []
-    found = []
-    for cut in outcome.cuts:
-        if cut.plan is not None:
-            took, pierced, gas = process_times(outcome.job, cut)
-            shown = "-" if gas is None else f"{gas:.2f}"
-            technique = cut.request.task.technique or "-"
-            found.append((cut.name, technique, f"{took:.2f}", f"{pierced:.2f}", shown))
-    return found
-
-
-def process_times(job: Job, cut: CutResult) -> tuple[float, float, float | None]:
-    """Return how long (s) a planned contour is cut, pierced, and how long its gas flows.
-
-    The last is None if the program does not switch the gas.
-    """
-    assert cut.plan is not None
-    took = float(cut.plan.time[-1] - cut.plan.time[0])
-    options = job.program.of(cut.contour)
-    wait, gas = laser_start(options)[1], options.gas_lead
-    return took, options.pierce_time, None if gas is None else gas + wait + took
 
 
 def process_notes(job: Job) -> list[str]:
@@ -288,22 +262,6 @@ def _power(job: Job, cut: CutResult) -> PowerPath | None:
         asked=along.fine_asked,
         facts=facts,
     )
-
-
-def power_of(job: Job, cut: CutResult) -> PowerAlong | None:
-    """Return the power along a cut as the program sets it; None without a plan, or if it does not.
-
-    It is None, too, if the program cannot be made, which is reported when it is written.
-    """
-    if cut.plan is None or job.program.language == "none":
-        return None
-    if job.program.of(cut.contour).power is None:
-        return None
-    try:
-        program = build_program([programmed(job, cut.plan, cut.as_run)], job.program)
-        return power_along(program, program.sections[0], job.program)
-    except InputError:
-        return None
 
 
 def _by_configuration(robot: Robot) -> Iterator[tuple[str, str]]:

@@ -24,6 +24,7 @@ from kerfpath.job.format.tables.part import MachineTable as MachineTable
 from kerfpath.job.format.tables.plan import PlanTable as PlanTable
 from kerfpath.job.format.tables.process import LONGEST_WORD as LONGEST_WORD
 from kerfpath.job.format.tables.process import ChartFile as ChartFile
+from kerfpath.job.format.tables.process import CostTable as CostTable
 from kerfpath.job.format.tables.process import JobRowTable as JobRowTable
 from kerfpath.job.format.tables.process import ProcessTable as ProcessTable
 from kerfpath.job.format.tables.process import RowTable as RowTable

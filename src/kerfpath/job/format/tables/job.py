@@ -27,7 +27,7 @@ from kerfpath.job.format.tables.part import (
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
-from kerfpath.job.format.tables.process import ProcessTable, checked_pairs
+from kerfpath.job.format.tables.process import CostTable, ProcessTable, checked_pairs
 from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
@@ -397,6 +397,7 @@ class JobFile(Table):
     layout: LayoutTable = LayoutTable()
     audit: AuditTable = AuditTable()
     program: ProgramTable = ProgramTable()
+    cost: CostTable | None = None
 
     @model_validator(mode="after")
     def _names_differ(self) -> JobFile:
@@ -411,6 +412,15 @@ class JobFile(Table):
             if table.technique is not None and self.process is None:
                 expected, remedy = "[process] with technique", "add [process], or remove technique"
                 raise fault(expected, "none", remedy, ("contour", i, "technique"))
+        return self
+
+    @model_validator(mode="after")
+    def _prices_of_process(self) -> JobFile:
+        if self.cost is not None and self.process is None:
+            for name in ("gas_per_m3", "power_per_kwh"):
+                if getattr(self.cost, name) is not None:
+                    expected = f"[process] with {name}, whose rows have gas and power"
+                    raise fault(expected, "none", f"add it, or remove {name}", ("cost", name))
         return self
 
     @model_validator(mode="after")

@@ -39,6 +39,7 @@ Pressure = Annotated[NotNegative | None, key("a number from 0 to 100, in bar", "
 Height = Annotated[Positive | None, key("a number above 0, at most 100, in mm", "1", le=100)]
 Length = Annotated[NotNegative | None, key("a number from 0 to 1000, in mm", "3", le=1000)]
 Seconds = Annotated[NotNegative | None, key("a number from 0 to 60, in s", "0.3", le=60)]
+Flow = Annotated[NotNegative | None, key("a number from 0 to 10000, in l/min", "300", le=10_000)]
 Focus = Annotated[
     Number | None,
     key("a number from -100 to 100, in mm, negative below the surface", "-1.5", ge=-100, le=100),
@@ -105,6 +106,7 @@ class RowTable(CutTable):
     micro_joint_mm: Length = None
     gas_lead_s: Seconds = None
     stand_off_mm: Height = None
+    gas_flow_l_min: Flow = None
     power_w: Power = None
     power_by_speed: Annotated[
         Pairs,
@@ -144,6 +146,13 @@ class RowTable(CutTable):
         """What the row is chosen by."""
         words = self.gas or "", self.quality or "", self.technique
         return (self.material, self.thickness_mm, *words)
+
+    @property
+    def beam_power(self) -> float | None:
+        """Power of the beam, or of the arc, W; None if it is not known."""
+        if self.power_w is None and self.current_a is not None and self.voltage_v is not None:
+            return self.current_a * self.voltage_v
+        return self.power_w
 
     @property
     def pierce_stages(self) -> list[list[float]] | None:
@@ -226,3 +235,42 @@ class ProcessTable(CutTable):
         dict[str, Word] | None,
         key("the technique of each contour, in a plan.json alone", '{ trim = "normal" }'),
     ] = None
+
+
+class CostTable(Table):
+    """[cost]: prices, by which gas, energy and time of a job cost something."""
+
+    currency: Annotated[Word, key("a currency", '"EUR"')]
+    gas_per_m3: Annotated[
+        dict[str, NotNegative] | None,
+        key("a price per m3 for each gas of the rows", "{ N2 = 0.4, O2 = 0.5 }"),
+    ] = None
+    power_per_kwh: Annotated[NotNegative | None, key("a number not below 0", "0.25")] = None
+    source_efficiency: Annotated[
+        Positive | None, key("a share above 0, at most 1, of the electric power", "0.35", le=1)
+    ] = None
+    machine_per_h: Annotated[NotNegative | None, key("a number not below 0", "80")] = None
+
+    @model_validator(mode="after")
+    def _some_price(self) -> CostTable:
+        if self.gas_per_m3 is None and self.power_per_kwh is None and self.machine_per_h is None:
+            expected = "gas_per_m3, power_per_kwh or machine_per_h"
+            raise fault(expected, "none", "add a price, or remove [cost]", ("currency",))
+        if (self.power_per_kwh is None) != (self.source_efficiency is None):
+            name = "source_efficiency" if self.source_efficiency else "power_per_kwh"
+            said = "both power_per_kwh and source_efficiency, or neither"
+            raise fault(said, name, "add the other, or remove it", (name,))
+        return self
+
+    def lacks(self, row: RowTable) -> tuple[str, str] | None:
+        """Return the key of a price, and what a row lacks for it; None if it lacks nothing."""
+        if self.gas_per_m3 is not None:
+            if row.gas is None:
+                return "gas_per_m3", "gas"
+            if row.gas not in self.gas_per_m3:
+                return "gas_per_m3", f"a gas with a price, it has {row.gas}"
+            if row.gas_flow_l_min is None:
+                return "gas_per_m3", "gas_flow_l_min"
+        if self.power_per_kwh is not None and row.beam_power is None:
+            return "power_per_kwh", "power_w"
+        return None
