@@ -162,3 +162,13 @@ def test_prices_of_gas_and_power_need_the_process_and_there_is_some_price(tmp_pa
     assert written(tmp_path, cost=f"{some}machine_per_h = 60\n", edit=without).cost is not None
     with pytest.raises(InputError, match="or machine_per_h"):
         written(tmp_path, cost=some)
+
+
+def test_a_row_for_any_gas_has_the_price_of_the_gas_of_the_job(tmp_path):
+    def edit(text):
+        text = text.replace('gas = "N2"\n', "").replace('gas = "O2"\n', "")
+        return text.replace("[process]\n", '[process]\ngas = "O2"\n', 1)
+
+    assert written(tmp_path, edit=edit).cost.gas_per_m3["O2"] == 0.5
+    with pytest.raises(InputError, match="expected gas in"):
+        written(tmp_path, edit=lambda text: edit(text).replace('gas = "O2"\n', "", 1))

@@ -266,6 +266,21 @@ class PortSettings(LanguageSettings):
         cls.__annotations__ = ways | own
 
 
+class PowerSettings(PortSettings):
+    """Settings that name the analogue output of the power, too, and its value at full power.
+
+    A subclass gives, as a keyword, the annotation of an analogue output in its language.
+    """
+
+    power_output: Any = None
+    power_full: PowerFull = None
+
+    def __init_subclass__(cls, *, analogue: Any = None, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        cls.power_output = None
+        cls.__annotations__ = {"power_output": analogue, **cls.__annotations__}
+
+
 def handshakes(settings: LanguageSettings) -> dict[tuple[Partner, str], Any]:
     """Return the inputs and outputs of handshakes that settings can name, by partner and way."""
     fields = (name.rpartition("_") for name in type(settings).model_fields)

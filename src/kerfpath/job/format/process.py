@@ -142,10 +142,12 @@ def _with_rows(
     }
 
 
-def require_prices(path: Path, cost: CostTable, rows: Sequence[JobRowTable]) -> None:
+def require_prices(
+    path: Path, cost: CostTable, process: ProcessTable, rows: Sequence[JobRowTable]
+) -> None:
     """Raise InputError unless rows have all that the prices of a job need."""
     for row in rows:
-        if (lacks := cost.lacks(row)) is not None:
+        if (lacks := cost.lacks(row, row.gas or process.gas)) is not None:
             key, what = lacks
             said = f"expected {what} in {row.place}, got none; add it, or remove {key}"
             raise refusal_at(path, ("cost", key), said)

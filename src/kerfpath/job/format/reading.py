@@ -290,7 +290,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
     drawing = file.part.drawing(path.parent)
     small = small_holes_of(path, text, source)
     if file.cost is not None and file.process is not None:
-        require_prices(path, file.cost, [*file.process.row, *([small.row] if small else [])])
+        rows = [*file.process.row, *([small.row] if small else [])]
+        require_prices(path, file.cost, file.process, rows)
     return Job(
         path=path,
         robot=robot,

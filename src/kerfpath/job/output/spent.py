@@ -125,12 +125,13 @@ def spent_on_all(outcome: JobResult) -> Spent:
 
 
 def row_of(job: Job, cut: CutResult) -> JobRowTable | None:
-    """Return the row of a contour's technique; None without [process]."""
+    """Return the row of a contour's technique with its gas; None without [process]."""
     if "process" not in job.source:
         return None
     process = ProcessTable.model_validate(job.source["process"])
     technique = cut.request.task.table.technique or process.technique
-    return next(row for row in process.row if row.technique == technique)
+    row = next(row for row in process.row if row.technique == technique)
+    return row.model_copy(update={"gas": row.gas or process.gas})
 
 
 def power_of(job: Job, cut: CutResult) -> PowerAlong | None:

@@ -26,8 +26,7 @@ from kerfpath.post.languages import (
     Inherited,
     OrientationSetting,
     OverrideSetting,
-    PortSettings,
-    PowerFull,
+    PowerSettings,
     Rules,
     ShortestMove,
     number,
@@ -65,14 +64,12 @@ Input = Annotated[int | None, numbered("a digital input", 4096)]
 Analogue = Annotated[int | None, numbered("an analogue output", 4096)]
 
 
-class FanucSettings(PortSettings, output=Output, input=Input):
+class FanucSettings(PowerSettings, output=Output, input=Input, analogue=Analogue):
     """Frames, outputs and options of the controller."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    power_output: Analogue = None
-    power_full: PowerFull = None
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d\d-\d\d-\d\d \d\d:\d\d:\d\d$")],
         setting("a date as YY-MM-DD hh:mm:ss", '"26-11-21 10:00:00"'),

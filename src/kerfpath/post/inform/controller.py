@@ -27,8 +27,7 @@ from kerfpath.post.languages import (
     Controller,
     Inherited,
     OrientationSetting,
-    PortSettings,
-    PowerFull,
+    PowerSettings,
     Rules,
     ShortestMove,
     numbered,
@@ -75,14 +74,12 @@ Input = Annotated[int | None, numbered("an input", 4096)]
 Analogue = Annotated[int | None, numbered("an analogue output", 40)]
 
 
-class InformSettings(PortSettings, output=Output, input=Input):
+class InformSettings(PowerSettings, output=Output, input=Input, analogue=Analogue):
     """Frames, outputs, and the pulses of the individual robot."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
     ] = 9999
-    power_output: Analogue = None
-    power_full: PowerFull = None
     user_frame: Annotated[int, setting("a user frame, 1 to 63", "2", ge=1, le=63)] = 1
     tool_number: Annotated[int, setting("a tool, 0 to 63", "2", ge=0, le=63)] = 0
     pulses_per_deg: Annotated[

@@ -28,9 +28,8 @@ from kerfpath.post.languages import (
     LinesPerFile,
     OrientationSetting,
     OverrideSetting,
-    PortSettings,
     PositionerFrame,
-    PowerFull,
+    PowerSettings,
     Rules,
     ShortestMove,
     number,
@@ -138,12 +137,10 @@ Numbers = Annotated[
 ]
 
 
-class KrlSettings(PortSettings, output=Output, input=Input):
+class KrlSettings(PowerSettings, output=Output, input=Input, analogue=Analogue):
     """Outputs, inputs, tool and base, and limits of the machine data."""
 
     lines_per_file: LinesPerFile = 1400
-    power_output: Analogue = None
-    power_full: PowerFull = None
     tool_number: Annotated[
         int | None, setting("the number of a TOOL_DATA, 1 to 128", "1", ge=1, le=128)
     ] = None

@@ -13,8 +13,7 @@ from kerfpath.post.languages import (
     Inherited,
     LinesPerFile,
     OverrideSetting,
-    PortSettings,
-    PowerFull,
+    PowerSettings,
     Rules,
     handshakes,
     setting,
@@ -46,12 +45,10 @@ Analogue = Annotated[
 ]
 
 
-class LinuxcncSettings(PortSettings, output=Output, input=Input):
+class LinuxcncSettings(PowerSettings, output=Output, input=Input, analogue=Analogue):
     """Inputs and outputs of the controller, the tolerance of its corners, and the override."""
 
     lines_per_file: LinesPerFile = 1_000_000
-    power_output: Analogue = None
-    power_full: PowerFull = None
     tolerance_deg: Annotated[
         float, setting("a number from 0.0001 to 1, in deg", "0.01", ge=1e-4, le=1)
     ] = 0.01

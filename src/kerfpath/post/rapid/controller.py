@@ -25,9 +25,8 @@ from kerfpath.post.languages import (
     Controller,
     Inherited,
     OrientationSetting,
-    PortSettings,
     PositionerFrame,
-    PowerFull,
+    PowerSettings,
     Rules,
     ShortestMove,
     number,
@@ -148,7 +147,7 @@ Letters = Annotated[
 Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
 
 
-class RapidSettings(PortSettings, output=Request, input=Input):
+class RapidSettings(PowerSettings, output=Request, input=Input, analogue=Analogue):
     """Names of outputs, inputs, frames and units at the controller."""
 
     laser_output: Annotated[Name, setting("the name of a digital output", '"doLaser"')] = "doLaser"
@@ -159,8 +158,6 @@ class RapidSettings(PortSettings, output=Request, input=Input):
     orientation: OrientationSetting = "slerp"
     shortest_move_ms: ShortestMove = None
     mechanical_units: Units = None
-    power_output: Analogue = None
-    power_full: PowerFull = None
     external_letters: Letters = None
     positioner_frame: PositionerFrame = None
 

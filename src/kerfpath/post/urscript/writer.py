@@ -26,7 +26,7 @@ from kerfpath.post.languages import (
     Formatter,
     Inherited,
     OrientationSetting,
-    PortSettings,
+    PowerSettings,
     Rules,
     ShortestMove,
     number,
@@ -193,10 +193,9 @@ Full = Annotated[
 ]
 
 
-class URScriptSettings(PortSettings, output=Output, input=Input):
+class URScriptSettings(PowerSettings, output=Output, input=Input, analogue=Analogue):
     """Inputs and outputs of the controller, and accelerations."""
 
-    power_output: Analogue = None
     power_full: Full = None
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)

@@ -262,13 +262,16 @@ class CostTable(Table):
             raise fault(said, name, "add the other, or remove it", (name,))
         return self
 
-    def lacks(self, row: RowTable) -> tuple[str, str] | None:
-        """Return the key of a price, and what a row lacks for it; None if it lacks nothing."""
+    def lacks(self, row: RowTable, gas: str | None) -> tuple[str, str] | None:
+        """Return the key of a price, and what a row lacks for it; None if it lacks nothing.
+
+        `gas` is that of the row, or that of the job for any gas.
+        """
         if self.gas_per_m3 is not None:
-            if row.gas is None:
+            if gas is None:
                 return "gas_per_m3", "gas"
-            if row.gas not in self.gas_per_m3:
-                return "gas_per_m3", f"a gas with a price, it has {row.gas}"
+            if gas not in self.gas_per_m3:
+                return "gas_per_m3", f"a gas with a price, it has {gas}"
             if row.gas_flow_l_min is None:
                 return "gas_per_m3", "gas_flow_l_min"
         if self.power_per_kwh is not None and row.beam_power is None:
