@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
-from kerfpath.certifier import MotionTest
+from kerfpath.certifier import MotionTest, infeasibility
 from kerfpath.certifier.stages import Steps
 from kerfpath.contour import Contour
 from kerfpath.errors import Closed
@@ -60,6 +60,24 @@ def test_a_contour_with_a_plan_is_never_closed_and_a_far_too_fast_one_is(
     closed = test.closed(limits, made.dt / 20)
     assert closed is not None
     assert 0 <= closed.node < len(nodes) - 1
+    assert test.closed(limits, made.dt / 20, closed.node, brief=True) is not None
+
+
+def test_a_brief_test_ends_where_halving_rules_out_little(
+    arm, tool, placement, monkeypatch, ceiling_at_work
+):
+    """It takes fewer rounds than the whole test to find nothing out."""
+    test, limits = test_of(drawn(0), arm, tool, placement), Limits.of(*arm.speed_limits())
+    rounds, forward = [], infeasibility._Round.forward
+    monkeypatch.setattr(
+        infeasibility._Round, "forward", lambda one: (rounds.append(one), forward(one))[1]
+    )
+    slow = 0.06
+    assert test.closed(limits, slow, 12) is None
+    whole = len(rounds)
+    rounds.clear()
+    assert test.closed(limits, slow, 12, brief=True) is None
+    assert infeasibility.FROM_HALVING <= len(rounds) < whole
 
 
 def test_a_refusal_says_that_it_holds_at_every_gamma(circle, arm, tool, placement):

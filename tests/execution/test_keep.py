@@ -54,6 +54,9 @@ def test_what_is_needed_between_the_nodes_is_brought_within_the_limits(tight):
     kept = keep_limits(tight)
     assert kept.done
     assert kept.rounds > 0
+    fewer = keep_limits(tight, rounds=kept.rounds - 1)
+    assert (fewer.done, fewer.rounds) == (False, kept.rounds - 1)
+    assert fewer.plan is tight
     run = longest(kept.plan)
     assert max(run.velocity_bound, run.acceleration_bound) <= 1
     velocity, acceleration = densely(run, build_program([kept.plan]))

@@ -35,6 +35,9 @@ MOST_CELLS = 2_000
 """Most cells of one node that may have a pose, before the test ends undecided."""
 EACH_PAIRS = 1_000_000
 """Most pairs of steps at one node for which (6) is tested in a round."""
+STALLED, FROM_HALVING = 0.2, 3
+"""Share of the halves that a round of a brief test must rule out, from which halving on: rounds
+that end in a proof rule out more, and those of other tests less and less."""
 
 
 def closed_node(
@@ -98,7 +101,9 @@ class MotionTest:
         self._count = len(frames)
         self._made, self._coarsest = np.zeros(self._count, np.bool_), list[CellSet]()
 
-    def closed(self, limits: Limits, dt: float, around: int | None = None) -> Closed | None:
+    def closed(
+        self, limits: Limits, dt: float, around: int | None = None, *, brief: bool = False
+    ) -> Closed | None:
         """Return the place that no motion passes, with nodes `dt` s apart; None if not proved.
 
         Motions that keep (5) and (6) at the nodes, ranges and couplings cannot pass a cell from
@@ -107,6 +112,7 @@ class MotionTest:
         around that node is tested, with finer cells: a motion that cannot pass a part cannot pass
         the whole contour. More than `MOST_NODES` nodes are not tested as a whole. Cells are at some
         nodes only where joints take many intervals to reach their velocity limit (`Steps.layers`).
+        With `brief`, it ends as soon as halving rules out little.
         """
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
@@ -140,7 +146,10 @@ class MotionTest:
             work += one.pairs
             if one.left or work > most_pairs:
                 return None
-            cells = self._maker.halves(one.cells.take(one.backward()))
+            passed, before = one.cells.take(one.backward()), len(one.cells)
+            if brief and halved >= FROM_HALVING - 1 and len(passed) > (1 - STALLED) * before:
+                return None
+            cells = self._maker.halves(passed)
         return None
 
     def _coarsest_at(self, nodes: Ints) -> CellSet:

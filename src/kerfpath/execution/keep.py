@@ -15,7 +15,8 @@ from kerfpath.post import PLAIN, Controller, Program, build_program
 from kerfpath.refiner import KeptShares, refine
 
 ROUNDS = 10
-"""Largest number of refinements; the first two or three do most of the work."""
+"""Largest number of refinements, unless another is asked for; the first two or three do most of the
+work."""
 AIM = 0.998
 """Share of the limits that is aimed at: proved bounds are a little above the true values."""
 CLOSER = 0.003
@@ -60,6 +61,7 @@ def keep_limits(
     program: Callable[[Plan], Program] = _alone,
     *,
     controller: Controller = PLAIN,
+    rounds: int = ROUNDS,
 ) -> Kept:
     """Return a plan whose program keeps every limit of velocity and acceleration at every instant.
 
@@ -75,6 +77,8 @@ def keep_limits(
         Returns the program of a plan; default: `build_program` with automatic zones.
     controller : Controller
         As in `executed`.
+    rounds : int
+        Largest number of refinements.
 
     Raises
     ------
@@ -88,11 +92,11 @@ def keep_limits(
     into, _ = meetings(intervals, periodic=plan.settings.closure == "periodic")
     kept = KeptShares(np.ones((intervals, n)), np.ones((len(into), n)))
     made, aim, why = plan, AIM, "lower limits at the nodes do not reduce it"
-    for count in range(ROUNDS + 1):
+    for count in range(rounds + 1):
         if max(run.velocity_bound, run.acceleration_bound) <= 1:
             statement = "it keeps the limits between the nodes, too"
             return Kept(plan=made, done=True, rounds=count, run=run, statement=statement)
-        if count == ROUNDS:
+        if count == rounds:
             break
         worst = run.most
         if np.isinf(worst) or np.isinf(run.acceleration_bound):

@@ -181,9 +181,9 @@ def impossible_share(task: Task, reached: float, nodes: Sequence[int]) -> float 
         return None
     limits = task.problem.limits
 
-    def impossible(times: float, around: int | None) -> bool:
+    def impossible(times: float, around: int | None, *, brief: bool = False) -> bool:
         """Return whether no motion is this many times as fast, tested around a node or at all."""
-        return test.closed(limits, reached / times, around) is not None
+        return test.closed(limits, reached / times, around, brief=brief) is not None
 
     low, high = 1.0, 2.0
     while not any(impossible(high, around) for around in (*nodes[:1], None)):
@@ -193,7 +193,7 @@ def impossible_share(task: Task, reached: float, nodes: Sequence[int]) -> float 
     for node in nodes:
         # The part around another node may be closed at a lower speed, too.
         least = low if node == nodes[0] else 1.0
-        if not impossible(high / CLOSE, node):
+        if not impossible(high / CLOSE, node, brief=node != nodes[0]):
             continue
         high /= CLOSE
         while high > CLOSE * least:

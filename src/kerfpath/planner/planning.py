@@ -58,6 +58,7 @@ def best_motion(
     speed: float | None,
     graph: LayeredGraph | None = None,
     phase: Callable[[str], None] | None = None,
+    thorough: bool = True,
 ) -> Plan:
     """Return the plan of the best motion found over continuous gamma.
 
@@ -70,6 +71,8 @@ def best_motion(
     contour, speed, options, graph, phase
         As in `kerfpath.plan`, method "continuous".
     setup : Setup
+    thorough : bool
+        Whether wider searches follow where the value function promises a better motion.
 
     Raises
     ------
@@ -86,7 +89,9 @@ def best_motion(
         task = along_a_course(task, CollisionFreeSearch(task).clear)
         finder, why = CollisionFreeSearch(task), grid_reason(task)
         begin("search")
-        found = None if why else clear_motion(task, finder, begin, explored=False)
+        found = (
+            None if why else clear_motion(task, finder, begin, thorough=thorough, explored=False)
+        )
         if found is None:
             raise NoFeasiblePath(
                 f"contour {contour.name!r}: no motion over continuous rotation"

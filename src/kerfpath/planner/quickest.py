@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -37,7 +38,8 @@ WIDE_ALIKE = (1.1, 0.5)
 SAME_VALLEY = 0.05
 """rad: paths whose gamma differs by less are refined to the same motion."""
 FACTORS = (1.05, 1.0, 1.15)
-"""Multiples of the speed reached at which valleys are explored."""
+"""Multiples of the speed reached at which valleys are explored, from the third on only where the
+last gained."""
 QUICKENED, FEW = 5, 2
 """Motions that are moved to their least interval after each screening; and where these are far from
 an interval that is wanted."""
@@ -92,9 +94,10 @@ def quick_motions(
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
     that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
     at the speed reached and above give the others, whatever they cost, until the speed no longer
-    grows, and, if `explore`, courses through all valleys. The speed, closure and costs of the task
-    do not matter: tasks that differ only in them have the same motions, in the same order. Where
-    the motions stay far from the `wanted` interval, s, the last of them are not looked for.
+    grows, and, if `explore`, courses through all valleys, twice, and again as long as the last
+    ones gained. The speed, closure and costs of the task do not matter: tasks that differ only in
+    them have the same motions, in the same order. Where the motions stay far from the `wanted`
+    interval, s, the last of them are not looked for.
 
     Raises
     ------
@@ -118,7 +121,9 @@ def quick_motions(
             best = found
             yield best
     if explore and best.dt <= NEAR * wanted:
-        for found in _through_valleys(task, finder, best, FACTORS[0], known, enough):
+        for found in _through_valleys(
+            task, finder, best, factor=FACTORS[0], known=known, enough=enough
+        ):
             best = found
             yield best
     if can_explore(task) and best.dt > enough:
@@ -130,13 +135,16 @@ def quick_motions(
             best = found
             yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
-    if not explore:
-        return
-    for factor in FACTORS[1:]:
-        for found in _through_valleys(task, finder, best, factor, known):
+    valleys = [partial(_through_valleys, factor=factor) for factor in FACTORS[1:]]
+    searches: list[Callable[..., Iterator[QuickMotion]]] = [*valleys, _shaken]
+    for search in searches:
+        if not explore:
+            return
+        before = best.dt
+        for found in search(task, finder, best, known=known):
             best = found
             yield best
-    yield from _shaken(task, finder, best, known)
+        explore = best.dt < (1 - GAIN) * before
 
 
 def _by_beam(
@@ -162,6 +170,7 @@ def _through_valleys(
     task: Task,
     finder: CollisionFreeSearch,
     best: QuickMotion,
+    *,
     factor: float,
     known: list[Course],
     enough: float = np.inf,

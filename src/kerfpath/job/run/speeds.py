@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -10,19 +11,22 @@ from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.execution import Executed, Kept, share_within
+from kerfpath.execution import ROUNDS, Executed, Kept, share_within
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import allowed_off, keeps_between_nodes, kept_between_nodes, run_of
 from kerfpath.job.format import ContourSpec, Job, prepare
-from kerfpath.planner import FastestSpeed, fastest_speed, plan
+from kerfpath.planner import FastestSpeed, best_motion, fastest_speed, plan
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 
 # -----------------------------------------------------------------------------
 # A fast speed of a contour at which its program also keeps the limits between the nodes.
 
-HALVINGS = 2
-"""Bisections between a speed that keeps the limits and one that was not found to."""
+HALVINGS, CLOSE = 4, 1.02
+"""Most bisections between a speed that keeps the limits and one that was not found to; and the
+factor between them from which on there are none."""
+DRAFT_ROUNDS = 3
+"""Most refinements of a draft so that it keeps the limits: where more are needed, few succeed."""
 SLOWER = 0.97
 """Factor on a speed that does not keep the limits, for the next one that is tried."""
 TRIES = 4
@@ -33,29 +37,36 @@ def speed_as_run(
 ) -> tuple[float, Kept] | None:
     """Return a speed, m/s, at which the program of a plan keeps the limits between the nodes.
 
-    It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by planning, and
-    proved for that speed and the plan that is returned; a faster one may exist. None if the job
-    does not ask for it, or if none is found. Times of the nodes are those at 1 m/s.
+    It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by drafts of
+    plans, and proved for that speed and the plan that is returned; a faster one may exist. None if
+    the job does not ask for it, or if none is found. Times of the nodes are those at 1 m/s.
     """
     if not keeps_between_nodes(job):
         return None
-    first = _kept(job, nodes, cell, fastest)
-    if first is not None and first.done:
-        return fastest, first
-    low, high = fastest * _share(first), fastest
-    for _ in range(TRIES):
-        if (found := _done(job, nodes, cell, low)) is not None:
-            break
-        low, high = SLOWER * low, low
-    else:
-        return None
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        if (faster := _done(job, nodes, cell, middle)) is not None:
-            low, found = middle, faster
+    kept = partial(_kept, job, nodes, cell)
+    first = kept(fastest, draft=True) or kept(fastest)
+    low, high = fastest, fastest
+    if first is None or not first.done:
+        low = fastest * _share(first)
+        for _ in range(TRIES):
+            if _is_done(kept(low, draft=True)):
+                break
+            low, high = SLOWER * low, low
         else:
-            high = middle
-    return low, found
+            return None
+        for _ in range(HALVINGS):
+            if high <= CLOSE * low:
+                break
+            middle = (low + high) / 2
+            if _is_done(kept(middle, draft=True)):
+                low = middle
+            else:
+                high = middle
+    for _ in range(TRIES):
+        if (found := kept(low)) is not None and found.done:
+            return low, found
+        low = SLOWER * low
+    return None
 
 
 def speed_true_to_path(job: Job, run: Executed | None, path: Contour, speed: float) -> float | None:
@@ -88,26 +99,38 @@ def _share(kept: Kept | None) -> float:
     return float(0.999 / slower) if np.isfinite(slower) else SLOWER
 
 
-def _done(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
-    """Return a plan at a speed that keeps the limits between its nodes; None without one."""
-    kept = _kept(job, nodes, cell, speed)
-    return kept if kept is not None and kept.done else None
+def _is_done(kept: Kept | None) -> bool:
+    """Return whether there is a plan, and it keeps the limits between its nodes."""
+    return kept is not None and kept.done
 
 
-def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
+def _kept(
+    job: Job, nodes: Contour, cell: Cell | None, speed: float, *, draft: bool = False
+) -> Kept | None:
     """Return a plan at a speed with the limits kept between its nodes; None without a plan."""
-    made = _planned(job, nodes, cell, speed)
-    return None if made is None else kept_between_nodes(job, made)
+    made = _planned(job, nodes, cell, speed, draft=draft)
+    if made is None:
+        return None
+    return kept_between_nodes(job, made, rounds=DRAFT_ROUNDS if draft else ROUNDS)
 
 
-def _planned(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Plan | None:
-    """Return a plan at a speed, m/s; None if there is none. Times of nodes are those at 1 m/s."""
+def _planned(
+    job: Job, nodes: Contour, cell: Cell | None, speed: float, *, draft: bool = False
+) -> Plan | None:
+    """Return a plan at a speed, m/s; None if there is none. Times of nodes are those at 1 m/s.
+
+    A `draft` is the best of the first motions found over continuous gamma.
+    """
     timed = nodes.time is not None
+    nodes = nodes if nodes.time is None else replace(nodes, time=nodes.time / speed)
+    at = None if timed else speed
+    options = replace(job.options, certify=None, between_nodes="reported")
     try:
+        if draft and options.method == "continuous":
+            return best_motion(nodes, job.setup_in(cell), options, speed=at, thorough=False)
         return plan(
-            nodes if nodes.time is None else replace(nodes, time=nodes.time / speed),
-            job.robot, tool=job.tool, placement=job.placement, speed=None if timed else speed,
-            options=replace(job.options, certify=None, between_nodes="reported"), cell=cell,
+            nodes, job.robot, tool=job.tool, placement=job.placement, speed=at, options=options,
+            cell=cell,
         )  # fmt: skip
     except NoFeasiblePath:
         return None
