@@ -1,5 +1,6 @@
 """Contours with techniques of their own: pierce, gas and power of each in programs, and audits."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -16,11 +17,19 @@ from kerfpath.job import (
     prepare,
     program_from_file,
     read_job,
+    require_foreseen,
     run_job,
     run_prepared,
     write_result,
 )
-from kerfpath.post import ProgramOptions, ReadPower, ReadWait, build_program, languages
+from kerfpath.post import (
+    ProgramOptions,
+    ReadPower,
+    ReadWait,
+    build_program,
+    languages,
+    unsafe_paths,
+)
 
 PROCESS = """\
 [process]
@@ -336,4 +345,112 @@ def test_sizes_that_cannot_be_are_refused_in_one_line(tmp_path, how, words):
     with pytest.raises(InputError) as caught:
         sized(tmp_path, **how)
     assert str(caught.value).isprintable()
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+# -----------------------------------------------------------------------------
+# Two gases, each by its own output.
+
+GAS_2 = {
+    "rapid": 'gas_2_output = "doGas2"\n',
+    "krl": "gas_2_output = 8\n",
+    "fanuc": "gas_2_output = 8\n",
+    "urscript": "gas_2_output = 2\n",
+    "linuxcnc": "gas_2_output = 2\n",
+    "val3": "gas_2_output = 'BasicIO-1\\\\%Q3'\n",
+    "inform": "gas_2_output = 8\n",
+}
+
+
+def two_gases(name):
+    text = job_text(name).replace(
+        "speed_m_min = 3\ngas_lead", 'gas = "O2"\nspeed_m_min = 3\ngas_lead'
+    )
+    text = text.replace("speed_m_min = 4\ngas_lead", 'gas = "N2"\nspeed_m_min = 4\ngas_lead')
+    text = text.replace("[program]\n", '[program]\ngas_2 = "O2"\n')
+    table = f"[program.{name}]\n"
+    return text.replace(table, table + GAS_2[name])
+
+
+@pytest.fixture(scope="module")
+def with_gases(planned, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gases")
+    _draw(folder / "points.csv")
+    found = {}
+    for name in GAS_2:
+        path = folder / f"{name}.toml"
+        path.write_text(two_gases(name))
+        audit = Audit.of(path)
+        plans = planned[name][0].plans
+        found[name] = plans, subject_of(audit, plans, audit.expected.job.program)
+    return found
+
+
+@pytest.mark.parametrize("name", GAS_2)
+def test_each_contour_has_the_gas_of_its_row(with_gases, name):
+    _, subject = with_gases[name]
+    assert subject.outcome(subject.files) == ("passed", "")
+    read = subject.read(subject.files)
+    assert unsafe_paths(read) == []
+    switched = [
+        [(s.signal, s.on) for move in section.moves for s in move.switches if "gas" in s.signal]
+        for section in read.sections
+    ]
+    assert [each for each in switched if each] == [
+        [("gas_2", True), ("gas_2", False)],
+        [("gas", True), ("gas", False)],
+    ]
+    sheet = subject.audit.expected.job.program.remarks
+    differ = any("ROWS DIFFER" in line for line in sheet)
+    assert differ == (name in PLAIN), "only powers that the operator sets differ"
+
+
+@pytest.mark.parametrize("name", GAS_2)
+@pytest.mark.parametrize("gases", [("gas", "gas"), ("gas_2", "gas_2"), ("gas", "gas_2")])
+def test_a_program_with_the_wrong_gas_does_not_pass(with_gases, name, gases):
+    plans, subject = with_gases[name]
+    options = subject.audit.expected.job.program
+    own = {
+        contour: {**each, "gas": gas}
+        for (contour, each), gas in zip(options.contours.items(), gases, strict=True)
+    }
+    edited = subject_of(subject.audit, plans, replace(options, contours=own))
+    outcome, said = subject.outcome(edited.files)
+    assert outcome == "caught"
+    assert "laser on without gas" in said
+
+
+@pytest.mark.parametrize("name", ["rapid", "krl"])
+def test_outputs_of_gases_that_are_left_on_or_out_do_not_pass(with_gases, name):
+    _, subject = with_gases[name]
+    pattern = {"rapid": r"trGas2\w+|doGas2", "krl": r"OUT\[8\]"}[name]
+    tried = 0
+    for file, text in subject.files.items():
+        lines = text.split("\n")
+        for k, line in enumerate(lines):
+            if not re.search(pattern, line) or "VAR" in line:
+                continue
+            other = re.sub(rf",?\\\\T\d:={pattern}|,{pattern}(?=,)", "", line)
+            left = [other] if other != line else []
+            edited = "\n".join([*lines[:k], *left, *lines[k + 1 :]])
+            assert subject.outcome({**subject.files, file: edited})[0] != "passed", line
+            tried += 1
+    assert tried >= 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('gas_2_output = "doGas2"\n', "", ["gas_2_output", "[program.rapid]"]),
+        ('gas_2_output = "doGas2"', 'gas_2_output = "doGas"', ["gas_output and gas_2_output"]),
+        ('gas_2 = "O2"', "gas_2 = 2", ["program.gas_2", "the gas"]),
+    ],
+)
+def test_gases_without_an_output_of_their_own_are_refused(tmp_path, old, new, words):
+    _draw(tmp_path / "points.csv")
+    text = two_gases("rapid")
+    assert old in text
+    (tmp_path / "job.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        require_foreseen(prepare(read_job(tmp_path / "job.toml")))
     assert all(word in str(caught.value) for word in words), str(caught.value)

@@ -18,6 +18,8 @@ import numpy as np
 from kerfpath.auditor import Check, Unit
 from kerfpath.job.audit_report import SAME_TIME, check
 from kerfpath.post import (
+    GASES,
+    Gas,
     ProgramOptions,
     ReadMove,
     ReadProgram,
@@ -29,10 +31,14 @@ from kerfpath.post import (
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 
+LIT: tuple[Signal, ...] = ("laser", *GASES)
+"""The signals that are on or off."""
 ENDLESS = 60.0
 """Assumed duration, s, of a move whose speed or limits are not known."""
 
 What = Literal["air", "approach", "start", "cut", "end", "retract"]
+_Found = tuple[float, int]
+"""A value and the step of the program that it is of."""
 WORDS: dict[What, str] = {
     "air": "laser on in a transfer move, or while the robot waits there",
     "approach": "laser on during the approach",
@@ -60,6 +66,8 @@ class BeamProcess:
         How long the beam may be on there.
     gas_lead : float s or None
         How long before the start the gas is to flow; None: the program does not switch it.
+    gas : {"gas", "gas_2"}
+        Which gas flows.
     stops : bool
         Whether the job asks for a stop at every node.
     """
@@ -69,6 +77,7 @@ class BeamProcess:
     start_wait: float
     pierce_time: float
     gas_lead: float | None
+    gas: Gas
     stops: bool
 
     @classmethod
@@ -84,6 +93,7 @@ class BeamProcess:
             start_wait=wait,
             pierce_time=wait + start_lead - lead_time,
             gas_lead=gas if gas is None or ahead else 0.0,
+            gas=options.gas,
             stops=options.zone == 0,
         )
 
@@ -138,7 +148,7 @@ def check_laser_and_gas(
     rows.append(_row("beam-file", said, _borders(spans, beam), 0, "count"))
     said = "switches of the laser that change nothing"
     rows.append(_row("beam-twice", said, _idle(events), 0, "count"))
-    for signal in ("laser", "gas"):
+    for signal in LIT:
         left = [event for event in events if event.signal == signal][-1:]
         found = [(float(event.on), event.step) for event in left]
         rows.append(_row(f"{signal}-at-the-end", f"{signal} on at the end", found, 0, "count"))
@@ -317,7 +327,7 @@ def _through(time: float, on: Sequence[tuple[float, float, int]]) -> bool:
 
 def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
     """Return the switches that change nothing: another is missing, or acts too early or late."""
-    state = {"laser": False, "gas": False}
+    state = dict.fromkeys(LIT, False)
     found = []
     for event in events:
         if state[event.signal] == event.on:
@@ -334,22 +344,27 @@ def _gas(
     switched: bool,
 ) -> list[Check]:
     """Return the checks that the gas flows before and with the beam, and nowhere else."""
-    gas = _on(events, "gas", shift=0.0)
     if not switched:
-        found = [(1.0, event.step) for event in events if event.signal == "gas"]
+        found = [(1.0, event.step) for event in events if event.signal in GASES]
         return [_row("gas", "gas switches that the job does not ask for", found, 0, "count")]
     spread = [(max(on, 0.0), off, step) for on, off, step in beam if off < np.inf]
-    without = [(off - on - _overlap(on, off, gas), step) for on, off, step in spread]
-    starts = [(span, span.process.gas_lead or 0.0) for span in spans if span.what == "approach"]
-    late = [(lead - _overlap(span.end - lead, span.end, gas), span.step) for span, lead in starts]
-    # The gas may also start at the beginning of the approach.
-    ahead = [(min(span.end - lead, span.start), span.end, span.step) for span, lead in starts]
-    idle = [
-        (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
-         span.step)
-        for span in spans
-        if span.what in ("air", "approach", "retract")
-    ]  # fmt: skip
+    begins = np.array([span.start for span in spans])
+    without, late, idle = list[_Found](), list[_Found](), list[_Found]()
+    for name in GASES:
+        gas = _on(events, name, shift=0.0)
+        for on, off, step in spread:
+            amid = max(int(np.searchsorted(begins, (on + off) / 2, side="right")) - 1, 0)
+            if spans[amid].process.gas == name:
+                without.append((off - on - _overlap(on, off, gas), step))
+        mine = [span for span in spans if span.process.gas == name]
+        starts = [(span, span.process.gas_lead or 0.0) for span in mine if span.what == "approach"]
+        late += [(lead - _overlap(s.end - lead, s.end, gas), s.step) for s, lead in starts]
+        # The gas may also start at the beginning of the approach.
+        ahead = [(min(s.end - lead, s.start), s.end, s.step) for s, lead in starts]
+        for span in spans:
+            if span.what in ("air", "approach", "retract") or span.process.gas != name:
+                allowed = _overlap(span.start, span.end, _both(gas, ahead))
+                idle.append((_overlap(span.start, span.end, gas) - allowed, span.step))
     return [
         _row("gas", "laser on without gas", without, SAME_TIME, "s"),
         _row("gas-lead", "delay of the gas before the start", late, SAME_TIME, "s"),

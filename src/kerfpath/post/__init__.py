@@ -57,10 +57,12 @@ from kerfpath.post.power import SAME_POWER as SAME_POWER
 from kerfpath.post.power import PowerBySpeed as PowerBySpeed
 from kerfpath.post.power import pierce_stages as pierce_stages
 from kerfpath.post.power import power_curve as power_curve
+from kerfpath.post.program import GASES as GASES
 from kerfpath.post.program import PARTNERS as PARTNERS
 from kerfpath.post.program import Await as Await
 from kerfpath.post.program import CircularMove as CircularMove
 from kerfpath.post.program import Comment as Comment
+from kerfpath.post.program import Gas as Gas
 from kerfpath.post.program import Handshake as Handshake
 from kerfpath.post.program import JointMove as JointMove
 from kerfpath.post.program import LinearMove as LinearMove

@@ -387,7 +387,7 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     laser, wait = laser_start(options)
     starts: tuple[Switch, ...] = (laser,)
     if options.gas_lead is not None:
-        starts = (Switch(signal="gas", on=True, lead_time=options.gas_lead), *starts)
+        starts = (Switch(signal=options.gas, on=True, lead_time=options.gas_lead), *starts)
     yield Comment(
         f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
         f"posture {posture_name(int(plan.posture[0]))}"
@@ -414,7 +414,7 @@ def laser_start(options: ProgramOptions) -> tuple[Switch, float]:
     on = [step.partner for step in options.handshakes if isinstance(step, Request) and step.on]
     if not on:
         return _laser(options, on=True), options.pierce_time
-    gas: tuple[Signal, ...] = () if options.gas_lead is None else ("gas",)
+    gas: tuple[Signal, ...] = () if options.gas_lead is None else (options.gas,)
     laser = Switch(signal="laser", on=True, needs=(*gas, *on))
     return laser, options.pierce_time + options.lead_time
 
@@ -453,7 +453,7 @@ def _cut(plan: Plan, T: Array, q: Array, options: ProgramOptions) -> Iterator[Li
             # At the end of a micro joint the laser is off already.
             switches = () if joint[k - 1] else (_laser(options, on=False),)
             if options.gas_lead is not None:
-                switches = (*switches, Switch(signal="gas", on=False))
+                switches = (*switches, Switch(signal=options.gas, on=False))
         elif joint[k] != joint[k - 1]:
             switches = (_laser(options, on=joint[k - 1]),)
         yield LinearMove(

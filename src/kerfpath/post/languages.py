@@ -21,11 +21,13 @@ from kerfpath.errors import InputError
 from kerfpath.names import LONGEST_NAME, identifiers
 from kerfpath.post.power import PowerFollows
 from kerfpath.post.program import (
+    GASES,
     PARTNERS,
     SIGNALS,
     Await,
     CircularMove,
     Comment,
+    Gas,
     Handshake,
     JointMove,
     LinearMove,
@@ -245,6 +247,7 @@ class PortSettings(LanguageSettings):
 
     laser_output: Any = None
     gas_output: Any = None
+    gas_2_output: Any = None
     ready_input: Any = None
     shutter_input: Any = None
     gas_pressure_input: Any = None
@@ -313,10 +316,16 @@ def ask_again_lines(
     ]
 
 
+def gas_outputs(settings: Any) -> dict[Any, Gas]:
+    """Return the signals of gases by their outputs, of those that settings name."""
+    named = {getattr(settings, f"{gas}_output"): gas for gas in GASES}
+    return {output: gas for output, gas in named.items() if output is not None}
+
+
 def outputs(settings: Any) -> list[Any]:
-    """Return all outputs that settings name: laser, gas, and those of requests."""
+    """Return all outputs that settings name: laser, gases, and those of requests."""
     requests = (port for (_, way), port in handshakes(settings).items() if way == "output")
-    named = (settings.laser_output, settings.gas_output, *requests)
+    named = (settings.laser_output, *gas_outputs(settings), *requests)
     return [output for output in named if output is not None]
 
 
@@ -534,7 +543,7 @@ class Formatter(ABC):
         ]
 
     def output(self, signal: Signal) -> Any:
-        """Return the output of a signal, from the settings `laser_output` and `gas_output`.
+        """Return the output of a signal, from the settings `laser_output`, `gas_output` and others.
 
         Raises
         ------

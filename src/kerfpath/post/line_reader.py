@@ -18,9 +18,10 @@ from kerfpath.post.harmless import (
     harmless_lines,
     without_remark,
 )
-from kerfpath.post.languages import LanguageSettings, handshakes
+from kerfpath.post.languages import LanguageSettings, gas_outputs, handshakes
 from kerfpath.post.program import (
     Await,
+    Gas,
     Handshake,
     Partner,
     Request,
@@ -403,7 +404,8 @@ class LineReader:
 
     def off(self, port: object) -> None:
         """Add that the output of a signal or partner is switched off, whatever it is."""
-        names = {self.settings.laser_output: "laser", self.settings.gas_output: "gas"}
+        names: dict[object, str] = {self.settings.laser_output: "laser"}
+        names |= gas_outputs(self.settings)
         name = names.get(port) or self.partner(port, "output")
         self.add(ReadOff, output=name)
 
@@ -480,14 +482,18 @@ class LineReader:
 
     def signal(self, output: object) -> Signal:
         """Return the signal that an output switches, by the settings."""
-        if output == self.settings.gas_output:
-            return "gas"
+        if (gas := gas_outputs(self.settings).get(output)) is not None:
+            return gas
         self.require_output(output, self.settings.laser_output)
         return "laser"
 
-    def gas_port(self) -> object:
-        """Return the output of the gas as the text names it."""
-        return self.settings.gas_output
+    def is_signal(self, output: object) -> bool:
+        """Return whether an output is that of the laser or of a gas."""
+        return output == self.settings.laser_output or output in gas_outputs(self.settings)
+
+    def gases(self) -> Mapping[Any, Gas]:
+        """Return the gases by their outputs as the text names them."""
+        return gas_outputs(self.settings)
 
     def require_output(self, output: object, expected: object) -> None:
         """Refuse an output that is not the expected one."""
@@ -499,10 +505,10 @@ class LineReader:
         last = self.last_on_path()
         if last is None or last.zone != 0:
             raise self.fault("the laser may go on here only after a motion of the path that stops")
-        gas = self.gas_port()
+        gases = self.gases()
         needs: tuple[Signal | Partner, ...] = ()
         for port in needed:
-            needs += ("gas" if port == gas else self.partner(port, "output"),)
+            needs += (gases.get(port) or self.partner(port, "output"),)
         self.add_switch(last, Switch(signal="laser", on=True, needs=needs), self.place)
 
     def last_on_path(self) -> ReadMove | None:

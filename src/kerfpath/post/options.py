@@ -18,7 +18,7 @@ from kerfpath.post.power import (
     pierce_stages,
     power_curve,
 )
-from kerfpath.post.program import Handshake
+from kerfpath.post.program import Gas, Handshake
 from kerfpath.setting import check, documented, setting
 
 
@@ -31,6 +31,7 @@ class ProgramKeywords(TypedDict, total=False):
     zone_error: float
     lead_time: float
     gas_lead: float | None
+    gas: Gas
     pierce_time: float
     approach_speed: float
     air_speed: float | None
@@ -49,7 +50,7 @@ class ProgramKeywords(TypedDict, total=False):
 
 PIERCE = ("pierce_time", "pierce_stages", "pierce_power")
 """Options of the pierce, which replace each other."""
-OF_CONTOURS = (*PIERCE, "gas_lead", "power_by_speed")
+OF_CONTOURS = (*PIERCE, "gas_lead", "gas", "power_by_speed")
 """Options that a contour may have of its own."""
 PIECE = ", piece "
 """What comes between the name of a contour and the number of one of its pieces."""
@@ -121,6 +122,11 @@ class ProgramOptions:
         unit="s",
         least=0,
         example="0.3",
+    )
+    gas: Gas = setting(
+        "gas",
+        "which gas the program switches, of those with an output: gas or gas_2",
+        takes=None,
     )
     pierce_time: float = setting(
         0.0,
@@ -219,7 +225,7 @@ class ProgramOptions:
     contours: Mapping[str, ProgramKeywords] = setting(
         dict,
         "what each contour has of its own, by its name: `pierce_time`, `pierce_stages`, "
-        "`pierce_power`, `gas_lead`, `power_by_speed`; empty: all have the same",
+        "`pierce_power`, `gas_lead`, `gas`, `power_by_speed`; empty: all have the same",
         takes=None,
     )
     handshakes: Sequence[Handshake] = setting(

@@ -307,8 +307,8 @@ def issues_before_planning(
         on = [laser]
         off = [Switch(signal="laser", on=False, lead_time=options.lead_time)]
         if own.gas_lead is not None:
-            on.insert(0, Switch(signal="gas", on=True, lead_time=own.gas_lead))
-            off.append(Switch(signal="gas", on=False))
+            on.insert(0, Switch(signal=own.gas, on=True, lead_time=own.gas_lead))
+            off.append(Switch(signal=own.gas, on=False))
         steps = (
             JointMove(q=q, speed=1.0),
             *options.handshakes,

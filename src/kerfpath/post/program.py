@@ -47,7 +47,10 @@ class ProgramIssue:
 # -----------------------------------------------------------------------------
 # The neutral program: the steps of the robot in order, before a language formats them.
 
-Signal = Literal["laser", "gas", "power"]
+Signal = Literal["laser", "gas", "gas_2", "power"]
+Gas = Literal["gas", "gas_2"]
+GASES: tuple[Gas, ...] = get_args(Gas)
+"""The signals of gases: a program has one of them in each contour."""
 SIGNALS: dict[str, Signal] = {word: word for word in get_args(Signal)}
 """Every signal by its name, for readers."""
 Partner = Literal["ready", "shutter", "gas_pressure", "height", "interlock"]
@@ -61,12 +64,12 @@ class Switch:
 
     Parameters
     ----------
-    signal : {"laser", "gas", "power"}
+    signal : {"laser", "gas", "gas_2", "power"}
         What is switched; the settings of a language name its output. That of the power is analogue.
     on : bool
     lead_time : float s
         Time before the tip arrives there; it compensates for the delay of output and source.
-    needs : tuple of {"gas", "ready", "shutter", "height"}
+    needs : tuple of {"gas", "gas_2", "ready", "shutter", "height"}
         Outputs, of the gas or of requests to partners, without which it stays off. After a stop
         they may be off. Only where the robot stops, without a lead time.
     share : float or None

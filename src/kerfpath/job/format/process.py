@@ -29,7 +29,7 @@ from kerfpath.job.format.tables import (
     StageTable,
 )
 from kerfpath.job.format.tables.process import NORMAL, SMALL_HOLE
-from kerfpath.post import ProgramKeywords, ProgramOptions
+from kerfpath.post import GASES, ProgramKeywords, ProgramOptions
 
 LEADS = {"lead_in": "lead_in_mm", "lead_out": "lead_out_mm"}
 """The key of a chart that has the length of each lead of a contour."""
@@ -267,6 +267,8 @@ def _alike(path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]) -
     each, found, full = [*_by_program(source, rows).values()], {}, full_power(source, rows)
     for key in dict.fromkeys(key for values in each for key in values):
         values = [one.get(key) for one in each]
+        if key == "gas":
+            continue  # which no key of [program] says
         if all(value == values[0] for value in values) and (key != CURVE or full is None):
             found[key] = values[0]
         elif key == "gas_lead_s" and None in values:
@@ -304,7 +306,8 @@ def _by_program(
     speed, the powers of all of them are known, and the job says nothing else of the pierce.
     """
     program, full = source.get("program", {}), full_power(source, rows)
-    powered = _names(source, "power_output")
+    powered, second = _names(source, "power_output"), program.get("gas_2")
+    gases = any(_names(source, f"{gas}_output") for gas in GASES)
     curves = full is not None or any(row.power_by_speed is not None for row in rows)
     follows = powered and (CURVE in program or curves)
     staged = follows and not {"pierce_time_s", "pierce_power", "pierce_stages"} & set(program)
@@ -318,8 +321,10 @@ def _by_program(
             values["pierce_stages"] = [[round(share * power, 6), time] for power, time in stages]
         elif row.pierce and not {"pierce_time_s", "pierce_stages"} & set(program):
             values["pierce_time_s"] = row.pierce_time
-        if _names(source, "gas_output") and "gas_lead_s" not in program:
+        if gases and "gas_lead_s" not in program:
             values |= {} if row.gas_lead_s is None else {"gas_lead_s": row.gas_lead_s}
+        if second is not None and (row.gas or source["process"].get("gas")) == second:
+            values["gas"] = "gas_2"
         if powered and curves and CURVE not in program:
             curve = row.power_by_speed or [[0.0, 1.0], [1.0, 1.0]]
             values[CURVE] = [[speed, round(share * power, 6)] for speed, power in curve]
@@ -473,7 +478,8 @@ def _alone(source: Mapping[str, Any], process: ProcessTable) -> list[set[str]]:
     rows = [{k: words for k, _, words in by_hand(source, process, row)} for row in process.row]
     keys = {key for row in rows for key in row if key not in ("note", "micro_joint_mm")}
     found = [{row.get(key, "") for row in rows} for key in sorted(keys)]
-    return [*found, {row.gas or "" for row in process.row}]
+    second = source.get("program", {}).get("gas_2")
+    return [*found, {row.gas or "" for row in process.row if row.gas != second or not row.gas}]
 
 
 def _cut_by(source: Mapping[str, Any], process: ProcessTable, row: JobRowTable) -> list[str]:

@@ -19,7 +19,7 @@ from kerfpath.post.read_program import MOVE_KINDS, FlowStep, ReadPower, ReadProg
 from kerfpath.robots import Robot
 
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
-_EVENT = re.compile(r"(?:(laser|gas) (on|off)|power (\d\.\d+)) (\d+\.\d+) s ahead", re.ASCII)
+_EVENT = re.compile(r"(?:(laser|gas|gas_2) (on|off)|power (\d\.\d+)) (\d+\.\d+) s ahead", re.ASCII)
 _POWER = re.compile(r"power (\d\.\d+)", re.ASCII)
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS = (*MOVE_KINDS, "via", "wait", "power")

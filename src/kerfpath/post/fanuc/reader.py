@@ -271,7 +271,7 @@ class _Section(Listing):
 
     def switch(self, output: str, value: str) -> None:
         on = value == "ON"
-        if int(output) not in (self.settings.laser_output, self.settings.gas_output):
+        if not self.is_signal(int(output)):
             self.ask(int(output), on=on)
             return
         switch = Switch(signal=self.signal(int(output)), on=on)

@@ -358,7 +358,7 @@ class _Job(_Text):
 
     def switch(self, output: str, state: str) -> None:
         on = state == "ON"
-        if int(output) not in (self.settings.laser_output, self.settings.gas_output):
+        if not self.is_signal(int(output)):
             self.ask(int(output), on=on)
             return
         last = self.last_on_path()

@@ -210,8 +210,7 @@ class _Reader(LineReader):
         self.switch(int(port), on=code == "62")
 
     def switch_now(self, code: str, port: str) -> None:
-        signals = (self.settings.laser_output, self.settings.gas_output)
-        if int(port) in signals:
+        if self.is_signal(int(port)):
             self.switch(int(port), on=code == "64", now=True)
         else:
             self.ask(int(port), on=code == "64")

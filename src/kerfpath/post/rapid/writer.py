@@ -22,6 +22,7 @@ from kerfpath.post.build import carrier_frame
 from kerfpath.post.languages import (
     Formatter,
     divide_sections,
+    gas_outputs,
     handshakes,
     number,
     outputs,
@@ -96,7 +97,8 @@ class Rapid(Formatter):
         )
         switches = [s for m in moves for s in switches_of(m) if not s.needs]
         self.trigger: dict[Switch, str] = {}
-        for signal, prefix in (("laser", "tr"), ("gas", "trGas"), ("power", "trPower")):
+        prefixes = {"laser": "tr", "gas": "trGas", "gas_2": "trGas2", "power": "trPower"}
+        for signal, prefix in prefixes.items():
             for on, suffix in ((True, "On"), (False, "Off")):
                 keys = (s for s in switches if (s.signal, s.on) == (signal, on))
                 self.trigger |= _number_names(f"{prefix}{suffix}", keys)
@@ -218,14 +220,14 @@ class Rapid(Formatter):
     def names(self) -> list[tuple[str, str]]:
         """Return every name in the module, with what it names."""
         settings = self.settings
-        gas, ports = settings.gas_output, handshakes(settings).items()
+        ports = handshakes(settings).items()
         power = settings.power_output
         return [
             (self.program.name, "the program"),
             (settings.tool_name, "the tool"),
             (settings.work_object, "the work object"),
             (settings.laser_output, "the output of the laser"),
-            *([] if gas is None else [(gas, "the output of the gas")]),
+            *((port, f"the output of the {gas}") for port, gas in gas_outputs(settings).items()),
             *([] if power is None else [(power, "the output of the power")]),
             *((name, f"the {way} of {who}") for (who, way), name in ports if name is not None),
             *((unit, "a mechanical unit") for unit in dict.fromkeys(self._units.units)),

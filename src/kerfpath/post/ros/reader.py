@@ -42,7 +42,7 @@ _EVENTS = patterns(
     {
         "section": r'- {section: "([A-Za-z]\w*)"}',
         "done": _TIME + "done: (joint|linear|wait)}",
-        "switch": _TIME + "set: (laser|gas), to: (true|false)}",
+        "switch": _TIME + "set: (laser|gas|gas_2), to: (true|false)}",
     }
 )
 

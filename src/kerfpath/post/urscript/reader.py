@@ -51,7 +51,7 @@ _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
 _MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
 _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
-_SIGNAL = "(laser|gas|power)"
+_SIGNAL = f"({'|'.join(SIGNALS)})"
 _VALUE = r"(True|False|\d+\.\d+)"
 _OUTPUT = r"get_standard_digital_out\(\d\)"
 _DEFINITION = LinePattern(r"def ([A-Za-z]\w*)\(\):")

@@ -65,7 +65,12 @@ LOCAL = ("due", "gap", "most", "near", "on", "port", "target", "value", "waited"
 """Names inside the thread and the functions of `switch_lines`; contours must not have them."""
 
 
-OFF: dict[Signal, str] = {"laser": "False", "gas": "False", "power": "0.0"}
+OFF: dict[Signal, str] = {
+    "laser": "False",
+    "gas": "False",
+    "gas_2": "False",
+    "power": "0.0",
+}
 """Value of each signal that is off."""
 
 

@@ -15,7 +15,7 @@ from kerfpath.post.arcs import faceplate, from_euler, world
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern, compact, harmless_lines
 from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines, statements
-from kerfpath.post.program import PARTNERS, SIGNALS, Await, Partner, Switch
+from kerfpath.post.program import GASES, PARTNERS, SIGNALS, Await, Gas, Partner, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadOff, ReadProgram
 from kerfpath.post.val3.controller import SAME, Val3Settings, joints_from_axes
 from kerfpath.post.val3.writer import (
@@ -200,7 +200,7 @@ _LINES = patterns(
         "circular": r"movec\(pPath\[(\d+)\],pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
         "joint": r"movej\(jAir\[(\d+)\],tLaser,mAir\[(\d+)\]\)",
         "stand": r"waitEndMove\(\)",
-        "switch": r"(dioLaser|dioGas)=(true|false)",
+        "switch": rf"({'|'.join(OUTPUTS.values())})=(true|false)",
         "guarded": r"dioLaser=(d\w+(?: and d\w+)*)",
         "request": r"(do[A-Z]\w*)=(true|false)",
         "wait_for": r"while watch\((di\w+)==true,(\d+\.\d+)\)==false",
@@ -426,7 +426,8 @@ class _Routine(LineReader):
             raise self.fault("a switch must follow a move of the path and waitEndMove()")
         if name not in links(self.settings):
             raise self.fault(f"{name} is not declared")
-        switch = Switch(signal="laser" if name == "dioLaser" else "gas", on=state == "true")
+        signal = next(signal for signal, known in OUTPUTS.items() if known == name)
+        switch = Switch(signal=SIGNALS[signal], on=state == "true")
         self.add_switch(last, switch, self.place)
 
     def guarded(self, needed: str) -> None:
@@ -434,8 +435,8 @@ class _Routine(LineReader):
             raise self.fault("a switch must follow a move of the path and waitEndMove()")
         self.add_needing(needed.split(" and "))
 
-    def gas_port(self) -> str:
-        return OUTPUTS["gas"]
+    def gases(self) -> Mapping[Any, Gas]:
+        return {OUTPUTS[gas]: gas for gas in GASES}
 
     def request(self, name: str, state: str) -> None:
         self.ask(name, on=state == "true")

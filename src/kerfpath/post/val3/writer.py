@@ -190,7 +190,7 @@ DATA = "http://www.staubli.com/robotics/VAL3/Data/2"
 HEAD = '<?xml version="1.0" encoding="utf-8"?>'
 TYPES = {"jAir": "jointRx", "mAir": "mdesc", "pPath": "pointRx", "mPath": "mdesc"}
 """Types of the data that moves refer to."""
-OUTPUTS = {"laser": "dioLaser", "gas": "dioGas"}
+OUTPUTS = {"laser": "dioLaser", "gas": "dioGas", "gas_2": "dioGas2"}
 PORTS = {
     ("ready", "input"): "diReady",
     ("shutter", "input"): "diShutter",
@@ -229,7 +229,7 @@ def parameters(settings: Val3Settings) -> dict[str, str]:
 
 def links(settings: Val3Settings) -> dict[str, str]:
     """Return the links of all inputs and outputs that the settings name, by their data."""
-    named = {OUTPUTS["laser"]: settings.laser_output, OUTPUTS["gas"]: settings.gas_output}
+    named = {name: getattr(settings, f"{signal}_output") for signal, name in OUTPUTS.items()}
     named |= {PORTS[key]: link for key, link in handshakes(settings).items()}
     return {name: link for name, link in named.items() if link is not None}
 

@@ -228,6 +228,9 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
     model_config = ConfigDict(extra="allow")
 
     name: Identifier = None
+    gas_2: Annotated[
+        Text | None, key("the gas that gas_2_output switches, as charts call it", '"O2"')
+    ] = None
     request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
     wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
     wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
@@ -412,6 +415,13 @@ class JobFile(Table):
             if table.technique is not None and self.process is None:
                 expected, remedy = "[process] with technique", "add [process], or remove technique"
                 raise fault(expected, "none", remedy, ("contour", i, "technique"))
+        return self
+
+    @model_validator(mode="after")
+    def _gas_of_process(self) -> JobFile:
+        if self.program.gas_2 is not None and self.process is None:
+            expected = "[process] with gas_2, whose rows have gases"
+            raise fault(expected, "none", "add it, or remove gas_2", ("program", "gas_2"))
         return self
 
     @model_validator(mode="after")
