@@ -86,6 +86,7 @@ def rejoined(
                 which = between_which(around[k], around[k + 1])
                 raise broken.with_message(f"{which}: {broken}") from None
         moves.append(replace(found, time=freeze(found.time / options.air_speed)))
+    pierce = options.pierce_time
     part = PartPlan(
         plans=tuple(plans),
         moves=tuple(moves),
@@ -93,6 +94,6 @@ def rejoined(
         chosen=tuple((k, 0) for k in range(len(plans))),
         retract=options.retract,
         approach_speed=options.approach_speed,
-        pierce_time=options.pierce_time,
+        pierce_time=tuple(pierce) if isinstance(pierce, Sequence) else pierce,
     )
     return replace(part, order=replace(part.order, duration=part.cycle_time))

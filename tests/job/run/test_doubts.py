@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+from OCP.StlAPI import StlAPI_Writer
 
 from cad.test_part import write_step
 from commands import run
@@ -12,6 +14,7 @@ from kerfpath import cad
 from kerfpath.contour import Contour
 from kerfpath.job import read_job
 from kerfpath.job.run import sides_in_doubt
+from kerfpath.job.run.doubts import both_sides
 
 HEIGHT, WALL = 60.0, 3.0
 
@@ -106,3 +109,38 @@ def test_a_drawing_of_lines_has_nothing_to_pass(tube):
     none = np.empty((0, 3)), np.empty((0, 3), np.int64)
     line = Contour(np.eye(3)[:2], np.tile([0, 0, -1.0], (2, 1)))
     assert not sides_in_doubt(read_job(job(tube, "outer")), [("line", line)], none)
+
+
+def drilled(shape, at, radius=5.0):
+    axis = gp_Ax2(gp_Pnt(*at), gp_Dir(0, 0, 1))
+    return cut(shape, BRepPrimAPI_MakeCylinder(axis, radius, 20).Shape())
+
+
+@pytest.mark.parametrize("write", ["step", "stl"])
+def test_a_sheet_that_is_cut_from_both_sides_is_warned_of(tmp_path, write):
+    sheet = drilled(drilled(box((0, 0, 0), (120, 60, 2)), (30, 30, -5)), (80, 30, -5), 8.0)
+    path = tmp_path / f"sheet.{write}"
+    if write == "step":
+        write_step(path, sheet)
+    else:
+        BRepMesh_IncrementalMesh(sheet, 0.05)
+        StlAPI_Writer().Write(sheet, str(path))
+    part = cad.read(path, unit="mm")
+    names = {s: [loop.name for loop in part.loops if loop.side == s and loop.is_main]
+             for s in ("outer", "inner")}  # fmt: skip
+    assert [len(each) for each in names.values()] == [3, 3]
+    (said,) = both_sides(part, [*names["outer"], *names["inner"]])
+    assert said.count(" and ") >= 3  # a pair each
+    assert 'side = "outer"' in said
+    for each in names.values():
+        assert both_sides(part, each) == []
+
+
+def test_opposite_walls_of_a_tube_are_not_cut_from_both_sides(tmp_path):
+    tube = cut(box((0, 0, 0), (200, 60, HEIGHT)), box((-1, 3, 3), (201, 57, HEIGHT - WALL)))
+    path = tmp_path / "walls.step"
+    write_step(path, drilled(drilled(tube, (100, 30, 50)), (100, 30, -5)))
+    part = cad.read(path)
+    holes = [loop.name for loop in part.loops if loop.side == "outer" and loop.diameter]
+    assert len(holes) == 2
+    assert both_sides(part, holes) == []

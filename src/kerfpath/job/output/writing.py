@@ -447,6 +447,7 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
     contours = {cut.contour: cut.candidate.nodes for cut in outcome.cuts}
+    notes += outcome.doubts
     notes += sides_in_doubt(job, contours.items(), outcome.mesh)
     notes += (
         process_notes(job)

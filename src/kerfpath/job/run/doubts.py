@@ -1,13 +1,13 @@
-"""Warn of contours that are surely cut from the wrong side: through the part, or from below."""
+"""Warn of contours that are cut through the part itself, from below, or from both sides."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from kerfpath.arrays import Array, Ints, spread
-from kerfpath.cad import Triangles
+from kerfpath.cad import Part, Triangles
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
 from kerfpath.names import listed
@@ -19,6 +19,9 @@ MOST_NODES = 200
 """Most nodes of a contour that are looked at."""
 FROM_BELOW = 0.5
 """Least rise of the mean tool axis, a sine, at which a contour is cut from below."""
+OPPOSITE, ALIKE = -0.9, 0.05
+"""Largest product of the mean axes of loops that face each other, and the share of their lengths by
+which these differ at most, and by which one lies beside the other."""
 MOST_LISTED = 3
 """Most contours that a warning names."""
 
@@ -59,6 +62,40 @@ def sides_in_doubt(
             "its other side"
         )
     return said
+
+
+def both_sides(part: Part, picked: Sequence[str]) -> list[str]:
+    """Return a warning if loops on both sides of a sheet are picked that are the same cut.
+
+    They face each other: opposite axes, nearly the same length, one behind the other.
+
+    Parameters
+    ----------
+    part : Part
+    picked : sequence of str
+        Names of the loops.
+    """
+    loops = [part.loop(name) for name in picked]
+    one, other = ([each for each in loops if each.side == s] for s in ("outer", "inner"))
+    if not (one and other):
+        return []
+    axes = {each.name: part.contour(each.name).axes.mean(axis=0) for each in (*one, *other)}
+    twice = list[tuple[str, str]]()
+    for a in other:
+        for b in one:
+            away = (b.bounding_box - a.bounding_box).mean(axis=0)
+            aside = np.linalg.norm(np.cross(away, axes[a.name]))
+            is_behind = axes[a.name] @ axes[b.name] < OPPOSITE and aside < ALIKE * a.length
+            if is_behind and abs(a.length - b.length) < ALIKE * b.length:
+                twice.append((a.name, b.name))
+                break
+    if not twice:
+        return []
+    which = listed([" and ".join(each) for each in twice], MOST_LISTED)
+    return [
+        f"{which}: the job cuts through the sheet from both sides, twice at the same place; pick "
+        'the loops of one side, with side = "outer" in [contour.pick_all] or by their names'
+    ]
 
 
 def _before_the_tip(part: Triangles, nodes: Contour) -> float:

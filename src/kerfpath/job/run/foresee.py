@@ -25,7 +25,7 @@ from kerfpath.job.format import (
     places_of,
     refusal_at,
 )
-from kerfpath.job.run.doubts import sides_in_doubt
+from kerfpath.job.run.doubts import both_sides, sides_in_doubt
 from kerfpath.job.run.reach import move_into_reach
 from kerfpath.planner import folds
 from kerfpath.plans import has_room
@@ -100,7 +100,8 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     cell = cell_of_job(job, part)
     plain = replace(job.options, comfort=None, retract=None, floor=None)
     starts, contours, asked, far = [], [], [], list[str]()
-    for task in job.tasks(part):
+    tasks = job.tasks(part)
+    for task in tasks:
         nodes = task.sample(task.candidates(part)[0])
         contours.append((task.name, nodes))
         asked.append((nodes, task.asked(job.options)))
@@ -112,7 +113,8 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
             far += _out_of_reach(job, task.name, nodes.points[some], graph)
     if far and (move := move_into_reach(job, asked)):
         far.append(str(move))
-    doubts = (*far, *sides_in_doubt(job, contours, part.mesh()))
+    twice = both_sides(part, [task.pick for task in tasks])
+    doubts = (*far, *twice, *sides_in_doubt(job, contours, part.mesh()))
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=doubts)
 
 

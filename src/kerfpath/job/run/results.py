@@ -157,6 +157,8 @@ class JobResult:
         The audit of the moves.
     not_planned : tuple of str
         Names of the contours that have no cut, as the run was stopped before.
+    doubts : tuple of str
+        Warnings about the loops that the job picks.
     """
 
     job: Job
@@ -167,6 +169,7 @@ class JobResult:
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
     not_planned: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
