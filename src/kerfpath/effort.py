@@ -36,6 +36,10 @@ class Effort:
     explored : bool
         Whether all valleys are explored where value function or bound leave room for a better
         motion; else wider beam searches follow.
+    worth_exploring : float
+        Relative gap of a motion to the value function, which leaves limits of acceleration out,
+        beyond which all valleys are explored; half of it where that is between samples of gamma. A
+        job of many contours raises it.
     certificate_pairs, certificate_pairs_per_node : int
         Most steps from cell to cell in a certificate, in all and in addition for each node, unless
         a time is given.
@@ -64,6 +68,7 @@ class Effort:
 
     certified: bool = True
     explored: bool = True
+    worth_exploring: float = 1e-2
     certificate_pairs: int = 10_000_000
     certificate_pairs_per_node: int = 60_000
     minimax_pairs: int = 3_000_000

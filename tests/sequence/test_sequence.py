@@ -12,19 +12,21 @@ import kerfpath
 from kerfpath import Contour, InputError, NoFeasiblePath, Plan, plan
 from kerfpath.auditor import transfer_checks
 from kerfpath.cell import box_between, cell_of
+from kerfpath.effort import current_effort
 from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight
 from kerfpath.sequence import (
     PlannedCuts,
     best_order,
     common_postures,
+    effort_for,
     inner_first,
     longest_search,
     order_candidates,
     order_plans,
     plan_part,
 )
-from kerfpath.sequence.part import on_near_turns
+from kerfpath.sequence.part import MANY, WORTH, on_near_turns
 from kerfpath.transfer import back_off, least_time, transfer_move
 from programs import read_text, text_of
 
@@ -561,3 +563,17 @@ def test_others_are_chosen_where_the_final_form_is_refused_or_much_slower(two_st
     assert found.cutting_time == pytest.approx(2 * sum(made[0].time[-1] for made in two_starts))
     with pytest.raises(NoFeasiblePath, match="none of its plans may be used"):
         ordered(two_starts, Settled(1.0, refused=6))
+
+
+def test_of_many_contours_one_posture_is_common():
+    few, many = ([[0, 1, 3]] * n + [[1, 2]] * 4 for n in (MANY - 4, MANY - 3))
+    assert common_postures(few, [None] * len(few)) == [[0, 1, 3]] * (MANY - 4) + [[1]] * 4
+    assert common_postures(many, [None] * len(many)) == [[1]] * len(many)
+
+
+def test_valleys_of_many_contours_are_explored_where_more_may_be_saved():
+    usual = current_effort().worth_exploring
+    for count, worth in ((MANY, usual), (MANY + 1, WORTH)):
+        with effort_for(count):
+            assert current_effort().worth_exploring == worth
+    assert current_effort().worth_exploring == usual

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.effort import current_effort
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan, unheard
 from kerfpath.planner.collision_free import CollisionFreeSearch
@@ -338,7 +339,7 @@ def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
     """
     exploration = Exploration(task, starts)
     exploration.begin()
-    if starts.above(search.value, ENOUGH) or exploration.promises:
+    if starts.above(search.value, current_effort().worth_exploring / 2) or exploration.promises:
         starts.refine([*search.paths(wide(task))])
         if starts.best is not None:
             exploration.run()

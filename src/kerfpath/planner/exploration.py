@@ -10,6 +10,7 @@ from itertools import islice
 
 import numpy as np
 
+from kerfpath.effort import current_effort
 from kerfpath.planner.courses import Courses
 from kerfpath.planner.screening import SHARP, SMOOTH
 from kerfpath.planner.starts import Starts
@@ -20,9 +21,9 @@ from kerfpath.search import Course
 
 FIRST = 3
 """Courses through the cheapest valleys that are refined before all are explored."""
-GOOD, GOOD_BY_FEW = 1e-2, 0.04
-"""Relative gaps to the value functions along all nodes, and along every few nodes, whose steps pass
-over what a course turns back between them: below both a motion is good."""
+BY_FEW = 4.0
+"""How many times `Effort.worth_exploring` the gap to the value function along every few nodes may
+be: their steps pass over what a course turns back between them."""
 REFINED, REFINED_AGAIN = 5, 3
 """Motions that are refined after the first screening, and after each later one."""
 HOPELESS = 1.25
@@ -64,8 +65,8 @@ class Exploration:
 
         Along every few nodes the value function sees courses that it misses along all of them.
         """
-        above, courses = self._starts.above, self._courses
-        return above(courses.value, GOOD) or above(courses.value_along_few, GOOD_BY_FEW)
+        above, courses, gap = self._starts.above, self._courses, current_effort().worth_exploring
+        return above(courses.value, gap) or above(courses.value_along_few, BY_FEW * gap)
 
     def run(self) -> None:
         """Screen and refine courses through all valleys; shake the best motions."""

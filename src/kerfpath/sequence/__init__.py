@@ -9,6 +9,7 @@ from kerfpath.sequence.part import PartPlan as PartPlan
 from kerfpath.sequence.part import PlannedCuts as PlannedCuts
 from kerfpath.sequence.part import common_postures as common_postures
 from kerfpath.sequence.part import distances_between as distances_between
+from kerfpath.sequence.part import effort_for as effort_for
 from kerfpath.sequence.part import longest_search as longest_search
 from kerfpath.sequence.part import order_candidates as order_candidates
 from kerfpath.sequence.part import order_plans as order_plans

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Generic, Protocol, TypedDict, TypeVar, Unpack, cast
@@ -17,6 +17,7 @@ from kerfpath.arrays import Array, Bools, Ints, floats, not_negative, scalar, sh
 from kerfpath.cell import Cell
 from kerfpath.certifier import SharedWork
 from kerfpath.contour import Contour
+from kerfpath.effort import changed_effort, current_effort
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner import best_motion, folds, layered_graph, plan, with_bound
@@ -26,6 +27,24 @@ from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
 from kerfpath.sequence.turned import turned
 from kerfpath.setup import Setup
 from kerfpath.transfer import End, TransferMove, back_off, explain_collision
+
+# -----------------------------------------------------------------------------
+# Parts of many contours, of which less is compared for each.
+
+MANY = 40
+"""Contours of a part beyond which they are planned in one common posture, valleys are explored only
+beyond a gap of `WORTH`, and an order whose candidates are final is taken at the latest the second
+time, see `LONGER`."""
+WORTH = 0.1
+
+
+@contextmanager
+def effort_for(contours: int) -> Iterator[None]:
+    """Plan with the effort that each of so many contours is worth, until the block ends."""
+    worth = current_effort().worth_exploring
+    with changed_effort(worth_exploring=worth if contours <= MANY else max(WORTH, worth)):
+        yield
+
 
 # -----------------------------------------------------------------------------
 # Select the candidates that the tool can approach and leave, and plan more where none is left.
@@ -48,7 +67,8 @@ def common_postures(
 ) -> list[list[int]]:
     """Return the postures in which each contour is planned so that a part may keep to one.
 
-    They are the wanted ones (None: all) in which at least half of the contours can be cut.
+    They are the wanted ones (None: all) in which at least half of the contours can be cut; of more
+    than `MANY` contours the one in which most can be cut.
 
     Parameters
     ----------
@@ -60,7 +80,10 @@ def common_postures(
         {int(p) for p in here if asked is None or p in asked}
         for here, asked in zip(served, wanted, strict=True)
     ]
-    shared = {p for p, n in Counter(p for each in able for p in each).items() if 2 * n >= len(able)}
+    often = Counter(p for each in able for p in sorted(each))
+    shared = {p for p, n in often.items() if 2 * n >= len(able)}
+    if len(able) > MANY:
+        shared &= {p for p, _ in often.most_common(1)}
     return [sorted(each & shared) for each in able]
 
 
@@ -400,10 +423,11 @@ def plan_part(
     wanted = replace(asked.on(robot), certify=None)  # only the chosen candidates are certified
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
-        return plan(
-            contour, robot, tool=tool, placement=placement, options=options,
-            speed=None if contour.time is not None else speeds[i], cell=order.get("cell"),
-        )  # fmt: skip
+        with effort_for(len(groups)):
+            return plan(
+                contour, robot, tool=tool, placement=placement, options=options,
+                speed=None if contour.time is not None else speeds[i], cell=order.get("cell"),
+            )  # fmt: skip
 
     tried: list[list[Plan]] = []
     for i, candidates in enumerate(groups):
@@ -552,12 +576,12 @@ class _Candidates(Generic[T]):
                 new |= other is not None
         return new
 
-    def settle(self, found: PartPlan) -> PartPlan | None:
+    def settle(self, found: PartPlan, longer: float) -> PartPlan | None:
         """Bring the chosen candidates of an order into their final form; return their order.
 
         Where that form differs they are ordered again, among themselves, with the bound of `found`.
-        None is returned where one may not be used, or their order takes longer by more than
-        `LONGER`: others may be better now.
+        None is returned where one may not be used, or their order takes longer by more than a
+        share `longer`: others may be better now.
 
         Raises
         ------
@@ -583,9 +607,9 @@ class _Candidates(Generic[T]):
                 raise NoFeasiblePath(said, proved=False, node=-1)
         if same or not usable:
             return found if same else None
-        return self._ordered_alone(found)
+        return self._ordered_alone(found, longer)
 
-    def _ordered_alone(self, found: PartPlan) -> PartPlan | None:
+    def _ordered_alone(self, found: PartPlan, longer: float) -> PartPlan | None:
         """Return the order of the chosen candidates of `found` among themselves, see `settle`."""
         chosen = dict(found.chosen)
         alone = [[made[chosen[i]]] for i, made in enumerate(self.plans)]
@@ -593,7 +617,7 @@ class _Candidates(Generic[T]):
             last = order_plans(alone, **self._keywords)
         except NoFeasiblePath:
             return None
-        if last.order.duration > (1 + LONGER) * found.order.duration:
+        if last.order.duration > (1 + longer) * found.order.duration:
             return None
         bound = min(found.order.at_least, last.order.duration)
         return replace(
@@ -674,8 +698,10 @@ def order_candidates(
         took, found = found.order.duration, ordered()
         if found.order.duration > (1 - SHORTER) * took:
             break
-    while (settled := offered.settle(found)) is None:
+    allowed = LONGER
+    while (settled := offered.settle(found, allowed)) is None:
         found = ordered()
+        allowed = LONGER if len(tried) <= MANY else np.inf
     found = settled
     # On the turns that the order has chosen.
     made = zip(found.chosen, found.plans, strict=True)

@@ -22,13 +22,20 @@ from kerfpath.job.run.contour import (
     plan_candidate,
     with_checks,
 )
+from kerfpath.job.run.doubts import both_sides
 from kerfpath.job.run.foresee import require_foreseen
 from kerfpath.job.run.remedy import Remedy
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import with_bound
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, StopEarly, may_stop, no_progress, unstopped
-from kerfpath.sequence import PlannedCuts, common_postures, longest_search, order_candidates
+from kerfpath.sequence import (
+    PlannedCuts,
+    common_postures,
+    effort_for,
+    longest_search,
+    order_candidates,
+)
 
 # -----------------------------------------------------------------------------
 # The order in which the contours of a job are cut, and the transfer moves between them.
@@ -241,7 +248,7 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
         progress(what, done, total)
 
     tried, count = list[list[tuple[CutResult, ...]]](), len(prepared.contours)
-    with suppress(StopEarly):
+    with suppress(StopEarly), effort_for(count):
         for contour in prepared.contours:
             may_stop()
             if count > 1:
@@ -250,11 +257,13 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
             tried.append(
                 [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )
-    return finished(prepared, order_cuts(prepared, tried, stoppable), stoppable)
+    with effort_for(count):
+        result = order_cuts(prepared, tried, stoppable)
+    return finished(prepared, result, stoppable)
 
 
 def finished(prepared: PreparedJob, result: JobResult, progress: Progress) -> JobResult:
-    """Return the result with bounds, advice to move the part, and the departures of its nodes."""
+    """Return the result with bounds, advice, warnings, and the departures of its nodes."""
     work = shared_work(result.cuts)
     cuts = tuple(certified(cut, progress, work) for cut in result.cuts)
     moves = dict[str, Remedy]()
@@ -263,7 +272,8 @@ def finished(prepared: PreparedJob, result: JobResult, progress: Progress) -> Jo
     cuts = tuple(
         replace(cut, advice=moves[cut.contour]) if cut.contour in moves else cut for cut in cuts
     )
-    return measured(prepared, result.with_cuts(cuts))
+    doubts = both_sides(prepared.part, [each.task.pick for each in prepared.contours])
+    return measured(prepared, replace(result.with_cuts(cuts), doubts=tuple(doubts)))
 
 
 def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
