@@ -1,5 +1,6 @@
 """Contours with techniques of their own: pierce, gas and power of each in programs, and audits."""
 
+import json
 import re
 from dataclasses import replace
 
@@ -7,6 +8,7 @@ import pytest
 from benchmarks.program_edits import ACCELERATION, ARM, ARMS, JOB, Subject, _draw
 from tests.job.test_power import POWER, STEPS
 
+from commands import run
 from jobs import DEMO, SMALL
 from kerfpath.cli.plan_output import _cut_entry
 from kerfpath.errors import InputError
@@ -20,6 +22,7 @@ from kerfpath.job import (
     require_foreseen,
     run_job,
     run_prepared,
+    touch_up,
     write_result,
 )
 from kerfpath.post import (
@@ -58,6 +61,7 @@ technique = "small-hole"
 POWERED = [name for name in STEPS if name != "csv"]
 PLAIN = ["val3", "ros", "inform", "csv"]
 """Languages that set no power in steps, and the table, whose settings name no output."""
+LANGUAGES, FAST = [*POWERED, *PLAIN], ("rapid", "krl", "val3")
 NOT_WRITTEN = {(name, "gas_lead") for name in ("fanuc", "val3", "linuxcnc", "inform")}
 """Lead times that are not in the text: the gas is switched where a move begins."""
 
@@ -81,7 +85,7 @@ def planned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("techniques")
     _draw(folder / "points.csv")
     plans, found = {}, {}
-    for name in [*POWERED, *PLAIN]:
+    for name in LANGUAGES:
         path = folder / f"{name}.toml"
         path.write_text(job_text(name))
         audit = Audit.of(path)
@@ -108,7 +112,7 @@ def subject_of(audit, plans, options):
     )
 
 
-@pytest.mark.parametrize("name", [*POWERED, *PLAIN])
+@pytest.mark.parametrize("name", LANGUAGES)
 def test_each_contour_has_the_pierce_gas_and_power_of_its_technique(planned, name):
     """Shares are those of the largest power of the rows; the job's audit passes."""
     _, subject = planned[name]
@@ -131,7 +135,10 @@ def test_each_contour_has_the_pierce_gas_and_power_of_its_technique(planned, nam
     assert bool(powers) == (name in POWERED)
 
 
-@pytest.mark.parametrize("name", [*POWERED, *PLAIN])
+@pytest.mark.parametrize(
+    "name",
+    [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in LANGUAGES],
+)
 @pytest.mark.parametrize("what", ["pierce_time", "gas_lead", "power_by_speed"])
 def test_a_program_with_a_value_of_the_other_technique_does_not_pass(planned, name, what):
     result, subject = planned[name]
@@ -311,6 +318,29 @@ def test_the_technique_by_size_is_in_notes_report_json_and_passes_its_audit(tmp_
     assert not Audit.of(tmp_path / "job.toml").audited(tmp_path / "out" / "job.mod").passed
 
 
+def test_the_command_says_which_holes_are_small(tmp_path):
+    sized(tmp_path)
+    shown = run("charts", "show", "--job", "job.toml", cwd=tmp_path)
+    assert "holes of at most 12 mm: the technique small-hole" in shown.stdout.replace("\n", " ")
+    said = run("charts", "show", "--job", "job.toml", "--json", cwd=tmp_path).stdout
+    assert json.loads(said)["small_holes"] == {"size_mm": 12.0, "row": "[[process.row]]"}
+
+
+@pytest.mark.slow
+def test_a_touch_up_of_a_job_with_small_holes_finds_the_moved_target_alone(tmp_path):
+    """The program that it compares with has the technique of the small hole, too."""
+    write_result(run_prepared(sized(tmp_path)), tmp_path / "out")
+    program = tmp_path / "out" / "job.mod"
+    lines = program.read_text().split("\n")
+    k = [k for k, line in enumerate(lines) if "MoveL [[" in line or "TriggL [[" in line][7]
+    lines[k] = re.sub(r"\[\[([-\d.]+)", lambda x: f"[[{float(x[1]) + 0.2:.4f}", lines[k], count=1)
+    program.write_text("\n".join(lines))
+    found = touch_up(program, tmp_path / "out" / "plan.json", tmp_path / "job.toml")
+    assert found.notes == ()
+    assert [(each.contour, each.node) for each in found.targets] == [("hole", 7)]
+
+
+@pytest.mark.slow
 def test_loops_of_one_table_have_their_technique_each(tmp_path):
     (tmp_path / "b_pillar.step").symlink_to(DEMO / "b_pillar.step")
     rows = PROCESS.replace('technique = "small-hole"\n', BY_SIZE, 1).partition("[[contour]]")[0]
@@ -406,7 +436,14 @@ def test_each_contour_has_the_gas_of_its_row(with_gases, name):
 
 
 @pytest.mark.parametrize("name", GAS_2)
-@pytest.mark.parametrize("gases", [("gas", "gas"), ("gas_2", "gas_2"), ("gas", "gas_2")])
+@pytest.mark.parametrize(
+    "gases",
+    [
+        pytest.param(("gas", "gas"), marks=pytest.mark.slow),
+        pytest.param(("gas_2", "gas_2"), marks=pytest.mark.slow),
+        ("gas", "gas_2"),
+    ],
+)
 def test_a_program_with_the_wrong_gas_does_not_pass(with_gases, name, gases):
     plans, subject = with_gases[name]
     options = subject.audit.expected.job.program

@@ -102,14 +102,25 @@ def trace(job_file: Path) -> None:
             f"{job_file}: expected a job with [process], got one without; add [process] with "
             "material and thickness_mm"
         )
+    small = job.small_holes
+    holes = small and {"size_mm": small.size * 1e3, "row": small.row.place}
     print_json(
-        {"origins": [origin_entry(each) for each in origins], "sheet": [*job.program.remarks]}
+        {
+            "origins": [origin_entry(each) for each in origins],
+            "sheet": [*job.program.remarks],
+            "small_holes": holes,
+        }
     )
     rows = [
         [escape(each.of), each.key, escape(each.shown), escape(each.origin), _set_by(each)]
         for each in origins
     ]
     table(["of", "value", "is", "from", "set by"], rows)
+    if small is not None:
+        out.print(
+            f"holes of at most {small.size * 1e3:g} mm: the technique {small.row.technique}, by "
+            f"{escape(small.row.place)}, unless their contour has one; the drawing is not read here"
+        )
 
 
 def convert(

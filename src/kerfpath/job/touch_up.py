@@ -124,6 +124,8 @@ def touch_up(
     job, file = read_job(job_file), read_plan_file(plan_file)
     _require_kind(job, file)
     part = job.read_part()
+    prepared = prepare(job, part)
+    job = prepared.job
     groups, notes = _read_edits(program, job, file)
     for p, group in zip(file.plans, groups, strict=True):
         if len(group.path) != len(p.contour) + 1:
@@ -137,7 +139,6 @@ def touch_up(
         for p, group in zip(file.plans, groups, strict=True)
     ]
     _require_few(program, targets, file.plans)
-    prepared = prepare(job, part)
     requests = dict(zip(prepared.names, prepared.contours, strict=True))
     if set(requests) != set(file.contours.values()):
         raise InputError(
