@@ -9,7 +9,7 @@ import pytest
 
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
-from kerfpath.post import inform, krl, languages
+from kerfpath.post import fanuc, inform, krl, languages
 from kerfpath.robots import robot
 
 JOB = """\
@@ -76,3 +76,19 @@ def test_bounds_of_krl_are_those_of_turn(name: str) -> None:
         assert sorted(axes) == pytest.approx([-360, 360])
     endless = arm.with_limits(endless=np.arange(6) == 5)
     assert np.isinf(languages()["krl"].bounds(endless)[0][5])
+
+
+@pytest.mark.parametrize("name", ["fanuc_m20id_25", "fanuc_r2000ic_210f"])
+def test_bounds_of_fanuc_are_those_of_the_turn_numbers(name: str) -> None:
+    """Turn numbers hold -8 to 7; limits that a program can have are kept."""
+    arm, language = robot(name), languages()["fanuc"]
+    limits = arm.joint_limits()
+    least, most = language.expressible(arm, limits.lower, limits.upper)
+    np.testing.assert_array_equal([least, most], [limits.lower, limits.upper])
+    wide = np.full(6, np.radians(5000))
+    ends = np.zeros((2, 6))
+    ends[:, [3, 4, 5]] = np.array(language.expressible(arm, -wide, wide))[:, [3, 4, 5]]
+    for turns in ("J1 J4 J6", "J4 J5 J6"):
+        counted = fanuc.posture(arm, ends, fanuc.FanucSettings(turns=turns))
+        numbers = np.array([each[3:] for each in counted])[:, -2:]
+        assert (np.abs(numbers) == 7).all()

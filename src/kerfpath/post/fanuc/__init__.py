@@ -2,7 +2,7 @@
 
 from kerfpath.post.fanuc.controller import FanucSettings as FanucSettings
 from kerfpath.post.fanuc.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.fanuc.controller import inherited, is_reserved, rules, sayable
+from kerfpath.post.fanuc.controller import bounds, inherited, is_reserved, rules, sayable
 from kerfpath.post.fanuc.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.fanuc.controller import posture as posture
 from kerfpath.post.fanuc.reader import read
@@ -23,6 +23,7 @@ FANUC = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    bounds=bounds,
     sayable=sayable,
     assumed={"laser_output": 1},
     externals=no_settings_needed,

@@ -209,6 +209,17 @@ COUNT = AxisCount(
 axes_from_joints = COUNT.from_joints
 joints_from_axes = COUNT.to_joints
 TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
+FEWEST_TURNS, MOST_TURNS = -8, 7
+"""Smallest and largest turn number that a configuration is assumed to hold."""
+FARTHEST_DEG = 360.0 * MOST_TURNS + 180 - 1e-3
+"""Angle, either way, within which every axis has such a turn number."""
+
+
+def bounds(robot: Robot) -> tuple[Array, Array]:
+    """Return the least and greatest joints (6,) rad whose turns a configuration can hold."""
+    widest = np.full(6, np.inf)
+    widest[[0, 3, 4, 5]] = np.radians(FARTHEST_DEG)
+    return COUNT.bounds(robot, widest)
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:

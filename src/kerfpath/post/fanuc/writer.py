@@ -22,6 +22,8 @@ from kerfpath.arrays import Ints
 from kerfpath.post.arcs import TICK, euler, not_whole
 from kerfpath.post.build import part_motion
 from kerfpath.post.fanuc.controller import (
+    FEWEST_TURNS,
+    MOST_TURNS,
     FanucSettings,
     axes_from_joints,
     extended_rows,
@@ -414,8 +416,6 @@ CORNER_STEP = 1e-3
 """Corner regions are written in whole numbers of this (m)."""
 CORNER_NOISE = 1e-6
 """Largest difference (m) of a zone from a whole number of them."""
-FEWEST_TURNS, MOST_TURNS = -8, 7
-"""Smallest and largest turn number that a configuration is assumed to hold."""
 
 
 def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
