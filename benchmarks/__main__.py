@@ -26,6 +26,7 @@ NAMES = (
     "corpus",
     "bent_parts",
     "large_drawings",
+    "nests",
     "mutants",
     "first_runs",
     "kerf",
@@ -124,6 +125,10 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
         from benchmarks import large_drawings
 
         return [large_drawings.run(quick=quick)]
+    if name == "nests":
+        from benchmarks import nests
+
+        return [nests.run(quick=quick)]
     if name == "mutants":
         from benchmarks import mutants
 
