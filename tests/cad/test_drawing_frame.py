@@ -42,9 +42,14 @@ def rectangle(space: Modelspace, low, high, *, lines: bool, **look: object) -> N
 
 
 def title_block(
-    space: Modelspace, corner: tuple[float, float], scale: float, **look: object
+    space: Modelspace,
+    corner: tuple[float, float],
+    scale: float,
+    *,
+    has_text: bool = True,
+    **look: object,
 ) -> None:
-    """Fields in a corner of a frame, with texts."""
+    """Fields in a corner of a frame, with texts or without."""
     right, y = corner
     x = right - 120 * scale
     top = y + 40 * scale
@@ -53,7 +58,7 @@ def title_block(
     for k in (1, 2, 3):
         space.add_line((x, y + 10 * k * scale), (right, y + 10 * k * scale), dxfattribs=look)
     space.add_line((x + 60 * scale, y), (x + 60 * scale, top), dxfattribs=look)
-    for k in range(4):
+    for k in range(4 if has_text else 0):
         at = (x + 3 * scale, y + (10 * k + 3) * scale)
         space.add_text("PLATE 4711", height=3 * scale, dxfattribs=look).set_placement(at)
 
@@ -103,6 +108,38 @@ def test_a_frame_with_a_title_block_is_recognised(tmp_path: Path, seed: int) -> 
     assert np.ptp(everything.bounding_box[:, 0]) == pytest.approx(
         (420 if twice else 390) * scale / 1e3
     )
+
+
+@pytest.mark.parametrize("lines", [False, True])
+def test_a_title_block_without_text_is_recognised_in_a_corner(tmp_path: Path, lines: bool) -> None:
+    """Around a plate without holes, which would be a hole in the frame."""
+
+    def draw(space: Modelspace) -> None:
+        plate(space, holes=0)
+        rectangle(space, (0, 0), A3, lines=lines)
+        title_block(space, (420, 0), 1.0, has_text=False)
+        for k in range(5):  # a word drawn as lines
+            space.add_line((303 + 4 * k, 3), (305 + 4 * k, 7))
+
+    part = framed(tmp_path, draw)
+    (asked,) = [one for one in part.left_out if one.may_cut]
+    assert "with a title block: it seems to be a drawing frame" in asked.reason
+    assert [loop.kind for loop in part.loops].count("outer") == 1
+    assert 1e3 * np.ptp(part.bounding_box[:, 0]) < 300
+
+
+def test_bend_lines_and_a_cross_are_no_title_block(tmp_path: Path) -> None:
+    def draw(space: Modelspace) -> None:
+        rectangle(space, (0, 0), A3, lines=False)
+        space.add_circle((60, 60), 12)
+        for x in (100, 320):
+            space.add_line((x, 0), (x, 297))
+        for y in (80, 200):
+            space.add_line((0, y), (420, y))
+
+    part = framed(tmp_path, draw)
+    assert not any(one.may_cut for one in part.left_out)
+    assert [loop.kind for loop in part.loops].count("open") == 4
 
 
 def test_a_rectangle_around_outlines_is_asked_about(tmp_path: Path) -> None:

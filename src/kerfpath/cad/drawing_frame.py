@@ -28,6 +28,8 @@ COVERED = 0.98
 """Share of each side of a frame that is drawn."""
 BLOCK_SHARE = 0.25
 """Largest share of the area of a frame that its title block takes."""
+FIELDS = 4
+"""Fewest lines of a title block without a text, as where the texts are drawn as lines."""
 MARK = 0.05
 """Longest mark on a side of a frame, as a share of its size."""
 MOST_JOINED = 3000
@@ -55,7 +57,8 @@ def drawing_frame(
 
     With a title block, these are all rectangles around each other up to that which it joins, the
     marks on their sides, and all lines that join it. A title block is of lines along x and y that
-    take a small part of the frame, with a text inside. Without one it is the outer rectangle.
+    take a small part of the frame, with a text inside, or at least `FIELDS` of them in a corner.
+    Without one it is the outer rectangle.
 
     Parameters
     ----------
@@ -82,7 +85,10 @@ def drawing_frame(
             for group, around in lines.joined(left, box, near)
             if np.ptp(around, axis=0).prod() <= BLOCK_SHARE * np.ptp(box, axis=0).prod()
         ]
-        if any(_has_text(around, texts) for _, around in blocks):
+        if any(
+            _has_text(around, texts) or lines.are_fields(group, around, box, near)
+            for group, around in blocks
+        ):
             taken = np.concatenate([*frames, *marks, *(group for group, _ in blocks)])
             return DrawingFrame(frozenset(keys[k] for k in taken.tolist()), True)
     return DrawingFrame(frozenset(keys[k] for k in frames[0].tolist()), False) if frames else None
@@ -148,6 +154,12 @@ class _Lines:
     def _touches(self, box: Array, near: float) -> Bools:
         low, high = self.boxes[:, 0, None], self.boxes[:, 1, None]
         return np.asarray(((low <= box + near) & (high >= box - near)).any(axis=(1, 2)))
+
+    def are_fields(self, group: Ints, around: Array, box: Array, near: float) -> bool:
+        """Return whether strokes are the fields in a corner of a box, with their box `around`."""
+        many = np.isin(self.owner, group).sum() >= FIELDS
+        at_sides = (np.abs(around - box) <= near).any(axis=0)
+        return bool(many and at_sides.all() and (np.ptp(around, axis=0) > near).all())
 
     def joined(self, left: Bools, box: Array, near: float) -> list[tuple[Ints, Array]]:
         """Return groups of strokes `left` that join the sides of a box, each with the box around.

@@ -471,7 +471,8 @@ class _Sheet:
             No rectangle is around the rest, and none was left out by its name.
         """
         has_islands = is_asked and is_around_islands(part.loops)
-        if is_asked and not self.texts and not has_islands:
+        has_lines = any(loop.kind == "open" for loop in part.loops)
+        if is_asked and not (self.texts or has_lines or has_islands):
             return False
         found = drawing_frame(self.strokes, self.texts)
         if is_asked and not (found and (found.has_title or has_islands)):
