@@ -47,6 +47,7 @@ set_effort(
         certificate_pairs_per_node=0,
         minimax_pairs=300_000,
         infeasibility_steps=200_000,
+        infeasibility_tubes=20,
         binding_nodes=2,
         speed_factors=(),
     )

@@ -5,9 +5,9 @@ import pytest
 from benchmarks import _arm
 
 from kerfpath import plan
-from kerfpath.certifier import bound, certify, parts
+from kerfpath.certifier import certify
 from kerfpath.certifier.cells import CellMaker
-from kerfpath.certifier.stages import Steps, distinct_groups, solve_stage
+from kerfpath.certifier.stages import StageResult, Steps, solve_stage
 from kerfpath.kernels.metric import MANHATTAN
 
 RANGE = np.radians([180, 95, 70, 250, 115, 350])
@@ -95,7 +95,7 @@ def test_what_is_left_out_repeats_what_is_kept_and_nothing_kept_another(seed, st
     maker, result = stage
     rng = np.random.default_rng(seed)
     kept = rng.random(len(result.cells)) < (1.0, 0.99, 0.9, 0.7, 0.3, 0.0)[seed]
-    found = [np.flatnonzero(group).tolist() for group in distinct_groups(result, kept, maker)]
+    found = [np.flatnonzero(group).tolist() for group in result.groups(kept, maker)]
     found = [group for group in found if group]
     every = groups(result, kept)
     assert all(group in every for group in found)
@@ -110,11 +110,10 @@ def test_bounding_repeated_motions_once_proves_the_same(robot, arc, tool, placem
     best = plan(arc, robot, tool=tool, placement=placement, speed=0.96, certify=None)
     once = certify(best, checkable=False)
 
-    def every(result, kept, maker):
+    def every(result, kept, _):
         return [np.isin(np.arange(len(kept)), group) for group in groups(result, kept)]
 
-    for module in (bound, parts):
-        monkeypatch.setattr(module, "distinct_groups", every)
+    monkeypatch.setattr(StageResult, "groups", every)
     twice = certify(best, checkable=False)
     assert once.pairs < twice.pairs
     # The same enclosures but for rounding, on other turns.

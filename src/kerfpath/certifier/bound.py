@@ -22,7 +22,6 @@ from kerfpath.certifier.stages import (
     LONGEST,
     StageResult,
     Steps,
-    distinct_groups,
     linked,
     solve_stage,
 )
@@ -348,7 +347,7 @@ class _Certification:
             clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.grain))
             live = result.through <= self.cost * (1 + clearly)
             if not self.checkable:
-                live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
+                live = np.logical_or.reduce(result.groups(live, self.maker))
             self._lower_goal(result)
             low = result.through < self.goal
             which, singular = cells_to_divide(

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.certifier.cells import CellMaker, CellSet
-from kerfpath.certifier.stages import Steps, arranged
+from kerfpath.certifier.elimination import Elimination
+from kerfpath.certifier.empty_tubes import EmptyTubes
+from kerfpath.certifier.stages import Steps
 from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
-from kerfpath.kernels.cell_elimination import (
-    blame_bends,
-    count_rejections,
-    keep_back,
-    keep_on,
-    list_steps,
-)
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.limits import Limits
@@ -33,11 +26,11 @@ MOST_NODES = 5_000
 """Most nodes of a contour that is tested as a whole: the cells of all are held, some 200 MB."""
 MOST_CELLS = 2_000
 """Most cells of one node that may have a pose, before the test ends undecided."""
-EACH_PAIRS = 1_000_000
-"""Most pairs of steps at one node for which (6) is tested in a round."""
 STALLED, FROM_HALVING = 0.2, 3
 """Share of the halves that a round of a brief test must rule out, from which halving on: rounds
 that end in a proof rule out more, and those of other tests less and less."""
+MANY_STEPS = 100_000
+"""Steps between cells above which motions are divided into tubes rather than cells into halves."""
 
 
 def closed_node(
@@ -62,17 +55,6 @@ def closed_node(
         if not len(cells):
             return Closed(node=int(node) - 1, joint=None, limit="pose")
     return None
-
-
-@dataclass(slots=True, eq=False)
-class _Layer:
-    """The steps from the cells of one layer: begin (C_k + 1,), to (E,), and which are kept (E,)."""
-
-    begin: Ints
-    to: Ints
-    kept: Bools
-
-    __repr__ = short_repr
 
 
 class MotionTest:
@@ -102,7 +84,13 @@ class MotionTest:
         self._made, self._coarsest = np.zeros(self._count, np.bool_), list[CellSet]()
 
     def closed(
-        self, limits: Limits, dt: float, around: int | None = None, *, brief: bool = False
+        self,
+        limits: Limits,
+        dt: float,
+        around: int | None = None,
+        *,
+        brief: bool = False,
+        tubes: int = 0,
     ) -> Closed | None:
         """Return the place that no motion passes, with nodes `dt` s apart; None if not proved.
 
@@ -112,10 +100,11 @@ class MotionTest:
         around that node is tested, with finer cells: a motion that cannot pass a part cannot pass
         the whole contour. More than `MOST_NODES` nodes are not tested as a whole. Cells are at some
         nodes only where joints take many intervals to reach their velocity limit (`Steps.layers`).
-        With `brief`, it ends as soon as halving rules out little.
+        With `brief`, it ends as soon as halving rules out little. With ``tubes``, motions are
+        divided into at most so many (`EmptyTubes`), once finer cells have too many steps.
         """
         steps = Steps(
-            weight=freeze(np.ones(len(self._endless))),
+            weight=freeze(np.zeros(len(self._endless))),
             velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
             acceleration=limits.acceleration.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
             metric=MANHATTAN,
@@ -139,7 +128,7 @@ class MotionTest:
                 )
             nodes = steps.layers(first, last)
             cells = cells.take(np.isin(cells.node, nodes))
-            one = _Round(cells, steps)
+            one = Elimination(cells, steps)
             found = one.forward()
             if found is not None:
                 return replace(found, node=int(nodes[found.node]))
@@ -149,6 +138,11 @@ class MotionTest:
             passed, before = one.cells.take(one.backward()), len(one.cells)
             if brief and halved >= FROM_HALVING - 1 and len(passed) > (1 - STALLED) * before:
                 return None
+            if tubes and len(nodes) > 2 and one.number > MANY_STEPS:
+                layer = EmptyTubes(self._maker, steps, nodes, tubes).closed(passed)
+                if layer is None:
+                    return None
+                return Closed(node=int(nodes[layer]) - 1, joint=None, limit="both")
             cells = self._maker.halves(passed)
         return None
 
@@ -160,97 +154,3 @@ class MotionTest:
             self._made[missing] = True
         (cells,) = self._coarsest
         return cells.take(np.isin(cells.node, nodes))
-
-
-class _Round:
-    """One forward and one backward sweep over cells of all nodes."""
-
-    def __init__(self, cells: CellSet, steps: Steps) -> None:
-        self.cells, self._packed, nodes, _ = arranged(cells, steps)
-        spans = np.diff(nodes).tolist()
-        self._steps = [steps.over(span) for span in spans]
-        self._bends = [steps.bend(*pair) for pair in pairwise(spans)]
-        moved = np.abs(self.cells.slope)
-        self._lead_v = np.argmax(moved / steps.velocity, axis=1)
-        self._lead_a = np.argmax(moved / steps.acceleration, axis=1)
-        self._layers: list[_Layer] = []
-        self.pairs, self.left, self._number = 0, False, 0
-
-    def forward(self) -> Closed | None:
-        """Keep the steps that motions from the first node may make; return where all end."""
-        start = self._packed.start
-        live = np.ones(len(self.cells), np.bool_)
-        for k in range(len(start) - 2):
-            layer = self._steps_from(k, live)
-            if layer is None:
-                return None
-            if not len(layer.to):
-                return self._closed(k, "velocity", live)
-            if k and self._few(self._layers[-1], layer, k):
-                before = self._layers[-1]
-                layer.kept[:] = False
-                self.pairs += keep_on(
-                    self._packed, self._steps[k], self._bends[k - 1], self._lead_a, k - 1,
-                    before.begin, before.to, before.kept, layer.begin, layer.to, layer.kept,
-                )  # fmt: skip
-                if not layer.kept.any():
-                    self._layers.append(layer)
-                    return self._closed(k, "acceleration", live)
-            self._layers.append(layer)
-            live[start[k + 1] : start[k + 2]] = False
-            live[layer.to[layer.kept]] = True
-        return None
-
-    def backward(self) -> Bools:
-        """Keep the steps from which motions may reach the end; return the cells (C,) passed."""
-        start = self._packed.start
-        live = np.zeros(len(self.cells), np.bool_)
-        last = self._layers[-1]
-        live[last.to[last.kept]] = True
-        for k in range(len(self._layers) - 1, -1, -1):
-            layer = self._layers[k]
-            layer.kept &= live[layer.to]
-            if k + 1 < len(self._layers) and self._few(layer, self._layers[k + 1], k + 1):
-                ahead = self._layers[k + 1]
-                self.pairs += keep_back(
-                    self._packed, self._steps[k], self._bends[k], self._lead_a, k,
-                    layer.begin, layer.to, ahead.begin, ahead.to, ahead.kept, layer.kept,
-                )  # fmt: skip
-            # Cells of the next layer stay only if a kept step leads to them, too.
-            reached = np.zeros(start[k + 2] - start[k + 1], np.bool_)
-            reached[layer.to[layer.kept] - start[k + 1]] = True
-            live[start[k + 1] : start[k + 2]] &= reached
-            cell = np.repeat(np.arange(start[k], start[k + 1]), np.diff(layer.begin))
-            live[cell[layer.kept]] = True
-        return live
-
-    def _steps_from(self, k: int, live: Bools) -> _Layer | None:
-        """Return the steps from the live cells of layer k; None if there are too many."""
-        start = self._packed.start
-        count = np.zeros(start[k + 1] - start[k], np.int64)
-        most = current_effort().infeasibility_steps - self._number
-        to = list_steps(self._packed, self._steps[k], self._lead_v, k, live, most, count)
-        self._number += len(to)
-        if len(to) > most:
-            self.left = True
-            return None
-        begin = np.concatenate([[0], np.cumsum(count)])
-        return _Layer(begin, to, np.ones(len(to), np.bool_))
-
-    def _few(self, layer: _Layer, ahead: _Layer, k: int) -> bool:
-        """Return whether the pairs of steps at layer k are few enough to be tested."""
-        onward = np.diff(ahead.begin)[layer.to[layer.kept] - self._packed.start[k]]
-        return bool(onward.sum() <= EACH_PAIRS)
-
-    def _closed(self, k: int, limit: Literal["velocity", "acceleration"], live: Bools) -> Closed:
-        """Return the closed place at node k, from which no step continues."""
-        blame = np.zeros(self.cells.center.shape[1], np.int64)
-        if limit == "velocity":
-            count_rejections(self._packed, self._steps[k], k, live, blame)
-        else:
-            before, layer = self._layers[-2:]
-            blame_bends(
-                self._packed, self._steps[k], self._bends[k - 1], self._lead_a, k - 1,
-                before.begin, before.to, before.kept, layer.begin, layer.to, blame,
-            )  # fmt: skip
-        return Closed(node=k, joint=int(np.argmax(blame)), limit=limit)

@@ -22,7 +22,7 @@ from kerfpath.arrays import Array, short_repr
 from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.division import cells_to_divide
-from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, solve_stage
+from kerfpath.certifier.stages import StageResult, Steps, solve_stage
 from kerfpath.kernels.metric import increments
 
 SAME_COST = 1e-9
@@ -127,7 +127,7 @@ class Parts:
             return
         cells = replace(result.cells, floor=through)
         layers = len(np.unique(cells.node))
-        for one in distinct_groups(result, kept, self._maker):
+        for one in result.groups(kept, self._maker):
             rest = cells.take(one)
             if len(np.unique(rest.node)) < layers:
                 continue  # no motion along the whole contour

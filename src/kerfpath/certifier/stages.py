@@ -251,6 +251,10 @@ class StageResult:
 
     __repr__ = short_repr
 
+    def groups(self, kept: Bools, maker: CellMaker) -> list[Bools]:
+        """Return the groups of kept cells that no step joins, see `distinct_groups`."""
+        return distinct_groups(self.cells, self.begin, self.to, kept, maker)
+
     @property
     def pairs(self) -> int:
         """Work of the stage in steps from cell to cell, with the tests of pairs converted."""
@@ -491,33 +495,37 @@ def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array
 # Groups of cells that no step joins, without groups that only repeat another one.
 
 
-def distinct_groups(result: StageResult, kept: Bools, maker: CellMaker) -> list[Bools]:
+def distinct_groups(
+    cells: CellSet, begin: Ints, to: Ints, kept: Bools, maker: CellMaker
+) -> list[Bools]:
     """Return the groups of kept cells that no step joins, (C,) bool each.
+
+    The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
 
     A group is left out if another one contains it up to whole turns of the joints or a flipped
     wrist (`Arm.flip`): each motion through it then has a counterpart through the other one at the
     same cost, as (5), (6) and the cost depend only on the sizes of increments.
     """
-    labels, count = _joined(result, kept)
+    labels, count = _joined(begin, to, kept)
     if count < 2:
         return [labels == 0]
-    which, turn = _codes(result.cells, maker)
+    which, turn = _codes(cells, maker)
     order = np.argsort(labels, kind="stable")
     groups = np.split(order, np.searchsorted(labels[order], np.arange(count)))[1:]
     found: list[Ints] = []
-    for cells in sorted(groups, key=len, reverse=True):
-        images = [cells + first for first in range(0, len(which), len(labels))]
+    for group in sorted(groups, key=len, reverse=True):
+        images = [group + first for first in range(0, len(which), len(labels))]
         if not any(_contains(which, turn, one, others) for others in found for one in images):
-            found.append(cells)
-    return [labels == labels[cells[0]] for cells in found]
+            found.append(group)
+    return [labels == labels[group[0]] for group in found]
 
 
-def _joined(result: StageResult, kept: Bools) -> tuple[Ints, int]:
+def _joined(begin: Ints, to: Ints, kept: Bools) -> tuple[Ints, int]:
     """Return the group (C,) of each cell, -1 if it is not kept, and the number of groups."""
-    cell = np.repeat(np.arange(len(kept)), np.diff(result.begin))
-    both = kept[cell] & kept[result.to]
+    cell = np.repeat(np.arange(len(kept)), np.diff(begin))
+    both = kept[cell] & kept[to]
     size = (len(kept),) * 2
-    steps = sparse.csr_array((np.ones(both.sum()), (cell[both], result.to[both])), shape=size)
+    steps = sparse.csr_array((np.ones(both.sum()), (cell[both], to[both])), shape=size)
     group = connected_components(steps, directed=False)[1]
     labels = np.full(len(kept), -1)
     alone, labels[kept] = np.unique(group[kept], return_inverse=True)

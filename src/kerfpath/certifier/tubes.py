@@ -4,7 +4,7 @@ Three bounds hold for the motions of a tube. The first is a linear (or second-or
 the squares, too: with q_k = c_k + s_k t + b_k t^2 / 2 +- r_k on the interval of node k, the pair
 (t, t^2) is replaced by (t, w) in the convex hull of the parabola, so that (5), (6) and the cost
 become convex. Its duals y of the increments and nu of (6) give a bound that is proved by itself,
-whatever they are (`_Tube.least`): a sum of minima of one quadratic function at each node. The other
+whatever they are (`Tube.least`): a sum of minima of one quadratic function at each node. The other
 two are stages on the cells of the tube, with nu of the whole tube and of its part around the motion
 that the program found; they rule out cells. The joints on an interval of half-width h differ from
 the convex hull by no more than a multiple of h^2, so that the first bound closes as tubes get
@@ -30,7 +30,7 @@ from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import FREE, TURN, CellMaker, CellSet
 from kerfpath.certifier.multipliers import Lengths
 from kerfpath.certifier.parts import CARE, SAME_COST
-from kerfpath.certifier.stages import ROUNDED, StageResult, Steps, distinct_groups, solve_stage
+from kerfpath.certifier.stages import ROUNDED, StageResult, Steps, solve_stage
 from kerfpath.conic import ConicSolution, NonnegativeConeT, minimise
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.kernels.reduced import excess
@@ -55,7 +55,7 @@ UNIT = 2.0**-52
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Tube:
+class Tube:
     """Curves of the joints on one interval of gamma at each of M layers.
 
     Parameters
@@ -168,7 +168,7 @@ class _Program:
         self._place = np.tile(np.arange(size), 4), np.concatenate([k + 1, k, M + k + 1, M + k])
         self._at = k, i
 
-    def solve(self, tube: _Tube) -> _Found | None:
+    def solve(self, tube: Tube) -> _Found | None:
         """Return what the program of a tube finds; None if the solver fails."""
         M, n = self._size
         k, i = self._at
@@ -268,7 +268,7 @@ class Tubes:
         cells = self._finer(part.cells)
         if len(np.unique(cells.node)) < len(self._nodes):
             return
-        low, high = self._hull(cells)
+        low, high = hull(cells, self._nodes)
         tube, found = self._tube(cells, low, high), None
         if tube is not None:
             found = self._solved(tube)
@@ -290,7 +290,7 @@ class Tubes:
         if not kept.any():
             return
         lost = 1 - float(kept.mean()) > 1 - AGAIN
-        for one in distinct_groups(results[0], kept, self._maker):
+        for one in results[0].groups(kept, self._maker):
             rest = cells.take(one)
             present = np.unique(rest.node)
             if len(present) < len(self._nodes):
@@ -325,24 +325,7 @@ class Tubes:
                 return cells
             cells = self._maker.divided(cells, which)
 
-    def _hull(self, cells: CellSet) -> tuple[Array, Array]:
-        """Return the ends (M,) of the shortest interval of gamma that holds the cells of a node."""
-        middle, half = cell_bounds(cells.level, cells.index)
-        order = np.lexsort((middle, cells.node))
-        low, high = np.empty((2, len(self._nodes)))
-        begin = np.searchsorted(cells.node[order], self._nodes)
-        last = 0.0
-        for k, which in enumerate(np.split(order, begin[1:])):
-            at, wide = middle[which], half[which]
-            gap = int(np.argmax(np.diff(at, append=at[0] + TURN))) + 1
-            at, wide = np.roll(at, -gap), np.roll(wide, -gap)
-            at = at[0] + np.mod(at - at[0], TURN)
-            turn = TURN * np.rint((last - at.mean()) / TURN)
-            low[k], high[k] = (at - wide).min() + turn, (at + wide).max() + turn
-            last = (low[k] + high[k]) / 2
-        return low, high
-
-    def _tube(self, cells: CellSet, low: Array, high: Array) -> _Tube | None:
+    def _tube(self, cells: CellSet, low: Array, high: Array) -> Tube | None:
         """Return the curves on the hull of cells, or on a part of it.
 
         None if they do not have certain increments: too wide, or in several postures or turns.
@@ -376,7 +359,7 @@ class Tubes:
         if (wide > np.pi)[:, ~ended].any():
             return None
         center[1:] -= np.cumsum(np.where(ended, 0.0, short), axis=0)
-        return _Tube(
+        return Tube(
             middle=middle,
             half=half,
             center=center,
@@ -385,12 +368,12 @@ class Tubes:
             spread=spread + ROUNDED * (1 + np.abs(center)),
         )
 
-    def _solved(self, tube: _Tube) -> _Found | None:
+    def _solved(self, tube: Tube) -> _Found | None:
         self.pairs += PROGRAM_PAIRS * len(self._nodes)
         return self._program.solve(tube)
 
     def _stages(
-        self, cells: CellSet, low: Array, high: Array, tube: _Tube | None, found: _Found | None
+        self, cells: CellSet, low: Array, high: Array, tube: Tube | None, found: _Found | None
     ) -> list[StageResult]:
         """Return stages on the cells, with the duals of the tube and of a part of it."""
         if tube is None or found is None:
@@ -422,7 +405,7 @@ class Tubes:
         self.pairs += result.pairs
         return result
 
-    def _halves(self, cells: CellSet, tube: _Tube | None, found: _Found | None) -> list[CellSet]:
+    def _halves(self, cells: CellSet, tube: Tube | None, found: _Found | None) -> list[CellSet]:
         """Return the cells on either side of the middle of a node, or none if it has one alone."""
         layer = np.searchsorted(self._nodes, cells.node)
         for k in range(len(self._nodes)):
@@ -430,7 +413,7 @@ class Tubes:
             postures = np.unique(cells.posture[here])
             if len(postures) > 1:
                 return [cells.take(~here | (cells.posture == p)) for p in postures]
-        low, high = self._hull(cells)
+        low, high = hull(cells, self._nodes)
         middle, _ = cell_bounds(cells.level, cells.index)
         off = middle - ((low + high) / 2)[layer]
         off -= TURN * np.rint(off / TURN)
@@ -451,3 +434,21 @@ def _least(cells: CellSet) -> float:
     """Return the least floor of the cells of a node, at the node where it is largest."""
     begin = np.flatnonzero(np.diff(cells.node, prepend=-1))
     return float(np.minimum.reduceat(cells.floor, begin).max())
+
+
+def hull(cells: CellSet, nodes: Ints) -> tuple[Array, Array]:
+    """Return the ends (M,) of the shortest interval of gamma that holds the cells of each node."""
+    middle, half = cell_bounds(cells.level, cells.index)
+    order = np.lexsort((middle, cells.node))
+    low, high = np.empty((2, len(nodes)))
+    begin = np.searchsorted(cells.node[order], nodes)
+    last = 0.0
+    for k, which in enumerate(np.split(order, begin[1:])):
+        at, wide = middle[which], half[which]
+        gap = int(np.argmax(np.diff(at, append=at[0] + TURN))) + 1
+        at, wide = np.roll(at, -gap), np.roll(wide, -gap)
+        at = at[0] + np.mod(at - at[0], TURN)
+        turn = TURN * np.rint((last - at.mean()) / TURN)
+        low[k], high[k] = (at - wide).min() + turn, (at + wide).max() + turn
+        last = (low[k] + high[k]) / 2
+    return low, high

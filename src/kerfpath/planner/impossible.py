@@ -55,15 +55,16 @@ def at_any_gamma(
     """Return the answer of a search without a path, with whether it is proved at every gamma.
 
     It is tried first around the nodes that bind `motions`, each quicker than the one before, where
-    it takes least work.
+    it takes least work; and at last by dividing motions into tubes.
     """
     test = motion_test(task)
     if test is None or task.settings.feed == "dip":
         return broken
     limits = task.problem.limits
     nodes = binding_nodes(motions)[:MOST_PLACES] if motions else [broken.node + 1]
-    places = (*nodes, None)
-    each = (test.closed(limits, task.dt, around) for around in places)
+    tubes = current_effort().infeasibility_tubes
+    tried = [(around, 0) for around in (*nodes, None)] + [(nodes[0], tubes), (None, tubes)]
+    each = (test.closed(limits, task.dt, around, tubes=most) for around, most in tried)
     closed = next((found for found in each if found is not None), None)
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
