@@ -68,9 +68,9 @@ def test_a_brief_test_ends_where_halving_rules_out_little(
 ):
     """It takes fewer rounds than the whole test to find nothing out."""
     test, limits = test_of(drawn(0), arm, tool, placement), Limits.of(*arm.speed_limits())
-    rounds, forward = [], infeasibility._Round.forward
+    rounds, forward = [], infeasibility.Elimination.forward
     monkeypatch.setattr(
-        infeasibility._Round, "forward", lambda one: (rounds.append(one), forward(one))[1]
+        infeasibility.Elimination, "forward", lambda one: (rounds.append(one), forward(one))[1]
     )
     slow = 0.06
     assert test.closed(limits, slow, 12) is None
