@@ -7,8 +7,9 @@ import pytest
 from benchmarks.program_edits import _draw
 from tests.job.test_techniques import job_text
 
+from kerfpath.cli.plan_output import _cut_entry, _times_entry
 from kerfpath.errors import InputError
-from kerfpath.job import prepare, read_job, run_prepared, spent_on, spent_on_all
+from kerfpath.job import prepare, read_job, run_prepared, spent_entry, spent_on, spent_on_all
 from kerfpath.job.output.writing import report_text
 
 COST = """
@@ -115,7 +116,7 @@ def test_all_together_are_the_sum(result):
     assert whole.air is None, "no moves are planned"
 
 
-def test_report_table_and_json_have_each_number_with_its_unit(result, tmp_path, capsys):
+def test_report_table_and_json_have_each_number_with_its_unit(result):
     page = report_text(result, ())
     section = page.partition("<h2>Process</h2>")[2].partition("</section>")[0]
     for words in ("Gas cost", "EUR", "kJ", "What each contour takes"):
@@ -125,6 +126,23 @@ def test_report_table_and_json_have_each_number_with_its_unit(result, tmp_path, 
     assert f"{slit.cost.total:.4f}" in section
     free = report_text(replace(result, job=replace(result.job, cost=None)), ())
     assert "EUR" not in free.partition("<h2>Process</h2>")[2].partition("</section>")[0]
+
+
+def test_the_json_of_a_contour_has_what_it_takes_beside_the_cost_of_its_plan(result):
+    cut = result.cuts[1]
+    spent, entry = spent_on(result.job, cut), _cut_entry(cut)
+    times = _times_entry(result.job, cut)
+    assert not set(entry) & set(times), "one would hide the other"
+    assert entry["cost"] == cut.plan.cost
+    assert (times["piercing_s"], times["gas_s"]) == (spent.piercing, spent.gas_time)
+    said = times["spent"]
+    assert (said["cutting_s"], said["gas_l"]) == (spent.cutting, spent.gas)
+    assert said["beam_kj"] == spent.energy / 1e3
+    assert said["cost"]["currency"] == "EUR"
+    assert said["cost"]["total"] == spent.cost.total
+    without = spent_entry(spent_on(replace(result.job, cost=None), cut))
+    assert without["cost"] is None
+    assert without["moves_s"] is None
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,7 @@ def finish_run(
             "drawing": drawing_entry(part),
             "contours": [_cut_entry(cut) | _times_entry(outcome.job, cut) for cut in outcome.cuts],
             "process": _process_entry(outcome.job),
-            "spent": _spent_entry(outcome),
+            "spent": spent_entry(spent_on_all(outcome)),
             "sequence": None if outcome.part is None else sequence_entry(outcome.part),
             "files": [str(f) for f in written.files],
             "removed": [str(f) for f in written.removed],
@@ -278,12 +278,9 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
 def _times_entry(job: Job, cut: CutResult) -> dict[str, object]:
     if cut.plan is None:
         return {}
-    return spent_entry(spent_on(job, cut)) | {"power": _power_entry(job, cut)}
-
-
-def _spent_entry(outcome: JobResult) -> dict[str, object]:
-    spent = spent_on_all(outcome)
-    return {"cutting_s": spent.cutting, "moves_s": spent.air} | spent_entry(spent)
+    spent = spent_on(job, cut)
+    times: dict[str, object] = {"piercing_s": spent.piercing, "gas_s": spent.gas_time}
+    return times | {"spent": spent_entry(spent), "power": _power_entry(job, cut)}
 
 
 def _show_spent(outcome: JobResult) -> None:

@@ -250,11 +250,13 @@ def _part(cost: Cost | None, key: str) -> float | None:
 
 
 def spent_entry(spent: Spent) -> dict[str, object]:
-    """Return gas, energy and cost as JSON data, with units in the names."""
+    """Return times, gas, energy and cost as JSON data, with units in the names."""
     cost = spent.cost
     energy = None if spent.energy is None else spent.energy / 1e3
     return {
+        "cutting_s": spent.cutting,
         "piercing_s": spent.piercing,
+        "moves_s": spent.air,
         "gas_s": spent.gas_time,
         "gas_l": spent.gas,
         "beam_kj": energy,
