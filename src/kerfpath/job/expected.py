@@ -429,7 +429,8 @@ def expect_sequence(
         moves=tuple(
             TransferMove(
                 q=m.q,
-                time=least_times(plans[0].robot, m.q, limits.eta_v, limits.eta_a),
+                time=least_times(plans[0].robot, m.q, limits.eta_v, limits.eta_a)
+                / (program.air_speed or 1.0),
                 clear=expected.cell is not None,
             )
             for m in moves

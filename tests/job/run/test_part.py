@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
-from jobs import CONTOURS, DEMO, HEAD, PLAN, SEQUENCE, WHOLE
+from jobs import CONTOURS, DEMO, HEAD, PLAN, SEQUENCE, SLIT_JOB, WHOLE, write_slit_jobs
 from kerfpath import audit, robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.job import program_from_file, read_job, read_plan_file, run_job
+from kerfpath.job import audit_file, program_from_file, read_job, read_plan_file, run_job
+from kerfpath.job.output import write_result
 from programs import read_text
 
 
@@ -246,3 +247,12 @@ def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder,
     assert all(each in ({0}, {1}) for each in found)
     assert not any(issue.level == "error" for plan in plans for issue in audit(plan))
     assert ("led in: other postures", 0, 1) in done
+
+
+def test_slow_transfer_moves_are_those_that_the_job_asks_for(tmp_path):
+    slow = SLIT_JOB + "[sequence]\n[program]\nair_speed = 0.5\n"
+    write_slit_jobs(tmp_path, {"full": SLIT_JOB + "[sequence]\n", "half": slow})
+    write_result(run_job(read_job(tmp_path / "half.toml")), tmp_path / "out")
+    plan = tmp_path / "out/plan.json"
+    assert audit_file(plan, tmp_path / "half.toml").passed
+    assert not audit_file(plan, tmp_path / "full.toml").passed
