@@ -10,7 +10,7 @@ from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore, ramps, smoothed, waves
-from kerfpath.planner.exploration import Exploration
+from kerfpath.planner.exploration import AGAIN, REFINED, REFINED_AGAIN, Exploration
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
 from kerfpath.setup import Setup
@@ -98,3 +98,25 @@ def test_the_valley_of_the_best_motion_is_found_from_another(circle, arm, tool, 
     assert starts.explored
     assert starts.best.cost_after <= best.cost * (1 + SAME)
     assert not [issue for issue in audit(starts.best.plan) if issue.level == "error"]
+
+
+@pytest.mark.parametrize(("share", "most"), [(1.0, AGAIN), (1.01, REFINED + REFINED_AGAIN)])
+def test_an_exploration_ends_where_the_best_motion_is_found_again(
+    circle, arm, tool, placement, monkeypatch, share, most
+):
+    """It goes on where refinements end elsewhere: to the first changes at random, not further."""
+    nodes = circle.resample(count=21)
+    options = PlanOptions(gamma_step=np.radians(10))
+    task = planning_task(nodes, Setup.of(arm, tool, placement), options, speed=0.45)
+    starts, ends = Starts(task, CollisionFreeSearch(task)), []
+    made = plan(nodes, arm, tool=tool, placement=placement, speed=0.45, gamma_step=np.radians(10))
+    starts.start_from(made, 0.0)
+
+    def refined(course, score):
+        ends.append(score)
+        return share * starts.best.cost_after
+
+    monkeypatch.setattr(starts, "refine_course", refined)
+    Exploration(task, starts).run()
+    assert AGAIN <= len(ends) <= most
+    assert (len(ends) == AGAIN) == (share == 1.0)

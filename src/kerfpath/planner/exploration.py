@@ -29,7 +29,10 @@ REFINED, REFINED_AGAIN = 5, 3
 HOPELESS = 1.25
 """Scores from this many times the best cost on are not refined: a refinement gains less."""
 ROUNDS = 2
-"""Times that the best motions are shaken."""
+"""Times that the best motions are shaken, the second only if the first gained."""
+AGAIN, SAME_END = 2, 1e-4
+"""Refinements that end at the best cost again, to this relative difference, from which on no more
+are made: motions that are not alike lead to it."""
 SHAKEN = 2
 """Best motions that are shaken."""
 SAME_COST = 1e-3
@@ -52,6 +55,7 @@ class Exploration:
     def __init__(self, task: Task, starts: Starts) -> None:
         self._starts, self._courses = starts, Courses(task)
         self._known: list[Course] = []
+        self._again = 0
 
     def begin(self) -> None:
         """Refine the courses through the cheapest valleys that may lead to better motions."""
@@ -74,19 +78,31 @@ class Exploration:
         courses = self._courses
         self._refine(courses.screened(courses.all(), SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
-            self._refine(courses.screened(courses.shaken(self._best()), SHARP), REFINED_AGAIN)
+            before = self._best_cost
+            if self._again < AGAIN:
+                self._refine(courses.screened(courses.shaken(self._best()), SHARP), REFINED_AGAIN)
+            if self._best_cost >= (1 - SAME_END) * before:
+                break
 
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
         """Refine the best motions, at most so many, that are not known."""
         tried = 0
         for score, course in screened:
-            best = self._starts.best
-            if tried == most or (best is not None and score > HOPELESS * best.cost_after):
+            best = self._best_cost
+            if tried == most or self._again == AGAIN or score > HOPELESS * best:
                 break
             if not self._is_known(course):
                 tried += 1
                 self._known.append(course)
-                self._starts.refine_course(self._courses.closed(course), score)
+                found = self._starts.refine_course(self._courses.closed(course), score)
+                if found <= (1 + SAME_END) * best < np.inf:
+                    self._again = self._again + 1 if found >= (1 - SAME_END) * best else 0
+
+    @property
+    def _best_cost(self) -> float:
+        """Cost of the best motion; infinite if there is none."""
+        best = self._starts.best
+        return np.inf if best is None else best.cost_after
 
     def _is_known(self, course: Course) -> bool:
         """Return whether a motion is nearly one that has been refined, or one found so."""

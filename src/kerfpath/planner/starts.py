@@ -43,6 +43,7 @@ class Starts:
         self.found: list[Refinement] = []
         self.best: Refinement | None = None
         self.explored = False
+        self._far_outside = False
         self.stopped = False
 
     @property
@@ -86,19 +87,24 @@ class Starts:
         best = self.best
         return best is not None and cost * (1 - GAIN) >= best.cost_after
 
-    def refine_course(self, course: Course, score: float) -> None:
+    def refine_course(self, course: Course, score: float) -> float:
         """Refine a course whose cost is about `score`; if need be, first bring it near the limits.
 
-        A refinement that begins far outside the limits may end at a cost far above the score.
+        A refinement that begins far outside the limits may end at a cost far above the score; once
+        one has, courses are brought near them at once. Returns the cost that is reached, infinite
+        where the motion breaks limits or is not clear.
         """
-        made = self._task.plan_at(*course, _CLAIM)
-        found = refiner.refine(made, first=FIRST_STEP)
-        if not (found.done and found.cost_after <= (1 + FAR) * score):
-            eased = refiner.refine(refiner.reduce_excess(made), first=FIRST_STEP)
-            found = min((found, eased), key=lambda each: (not each.done, each.cost_after))
-        if found.done and self.finder.is_clear(found.plan) and self._has_room(found.plan):
-            self.found.append(found)
-            self.best = _better(self.best, found)
+        made, ease = self._task.plan_at(*course, _CLAIM), self._far_outside
+        found = _refined(made, ease=ease)
+        if not (found.done and (ease or found.cost_after <= (1 + FAR) * score)):
+            self._far_outside |= found.done
+            other = _refined(made, ease=not ease)
+            found = min((found, other), key=lambda each: (not each.done, each.cost_after))
+        if not (found.done and self.finder.is_clear(found.plan) and self._has_room(found.plan)):
+            return np.inf
+        self.found.append(found)
+        self.best = _better(self.best, found)
+        return found.cost_after
 
     def _has_room(self, made: Plan) -> bool:
         """Return whether the tool can back off at each end where it can in the best motion."""
@@ -129,6 +135,11 @@ class Starts:
         if found is not None and found.done and self.finder.is_clear(found.plan):
             own = replace(found.plan, settings=self._task.settings)
             self.best = _better(self.best, replace(found, plan=own))
+
+
+def _refined(made: Plan, *, ease: bool) -> Refinement:
+    """Return the refinement of a motion, which is first brought near the limits if `ease`."""
+    return refiner.refine(refiner.reduce_excess(made) if ease else made, first=FIRST_STEP)
 
 
 def _refine_path(
