@@ -109,7 +109,8 @@ def test_prices_make_the_cost_and_without_them_there_is_none(result):
 
 
 def test_all_together_are_the_sum(result):
-    each, whole = [spent_on(result.job, cut) for cut in result.cuts], spent_on_all(result)
+    each = [spent_on(result.job, cut) for cut in result.cuts]
+    whole = spent_on_all(result, each)
     for name in ("cutting", "piercing", "gas_time", "gas", "energy"):
         assert getattr(whole, name) == pytest.approx(sum(getattr(one, name) for one in each))
     assert whole.cost.total == pytest.approx(sum(one.cost.total for one in each))
@@ -131,7 +132,7 @@ def test_report_table_and_json_have_each_number_with_its_unit(result):
 def test_the_json_of_a_contour_has_what_it_takes_beside_the_cost_of_its_plan(result):
     cut = result.cuts[1]
     spent, entry = spent_on(result.job, cut), _cut_entry(cut)
-    times = _times_entry(result.job, cut)
+    times = _times_entry(result.job, cut, spent)
     assert not set(entry) & set(times), "one would hide the other"
     assert entry["cost"] == cut.plan.cost
     assert (times["piercing_s"], times["gas_s"]) == (spent.piercing, spent.gas_time)

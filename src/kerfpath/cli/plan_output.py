@@ -33,6 +33,7 @@ from kerfpath.job import (
     CutResult,
     Job,
     JobResult,
+    Spent,
     origins_of,
     power_of,
     prepare,
@@ -174,14 +175,19 @@ def finish_run(
     """
     with busy("writing"):
         written = write_result(outcome, folder, strict=strict)
+    planned = (cut for cut in outcome.cuts if cut.plan is not None)
+    spent = {cut.name: spent_on(outcome.job, cut) for cut in planned}
     print_json(
         {
             "passed": outcome.passed,
             "not_planned": list(outcome.not_planned),
             "drawing": drawing_entry(part),
-            "contours": [_cut_entry(cut) | _times_entry(outcome.job, cut) for cut in outcome.cuts],
+            "contours": [
+                _cut_entry(cut) | _times_entry(outcome.job, cut, spent.get(cut.name))
+                for cut in outcome.cuts
+            ],
             "process": _process_entry(outcome.job),
-            "spent": spent_entry(spent_on_all(outcome)),
+            "spent": spent_entry(spent_on_all(outcome, [*spent.values()])),
             "sequence": None if outcome.part is None else sequence_entry(outcome.part),
             "files": [str(f) for f in written.files],
             "removed": [str(f) for f in written.removed],
@@ -275,10 +281,9 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
     }
 
 
-def _times_entry(job: Job, cut: CutResult) -> dict[str, object]:
-    if cut.plan is None:
+def _times_entry(job: Job, cut: CutResult, spent: Spent | None) -> dict[str, object]:
+    if spent is None:
         return {}
-    spent = spent_on(job, cut)
     times: dict[str, object] = {"piercing_s": spent.piercing, "gas_s": spent.gas_time}
     return times | {"spent": spent_entry(spent), "power": _power_entry(job, cut)}
 

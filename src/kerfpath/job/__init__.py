@@ -55,6 +55,7 @@ from kerfpath.job.format import with_map as with_map
 from kerfpath.job.format import without_contour as without_contour
 from kerfpath.job.output import FileTexts as FileTexts
 from kerfpath.job.output import ProgramPlaces as ProgramPlaces
+from kerfpath.job.output import Spent as Spent
 from kerfpath.job.output import WrittenFiles as WrittenFiles
 from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text

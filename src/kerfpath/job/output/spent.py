@@ -8,7 +8,7 @@ pierce, times the duty, with none along micro joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,9 +94,11 @@ def spent_on(job: Job, cut: CutResult) -> Spent:
     )
 
 
-def spent_on_all(outcome: JobResult) -> Spent:
-    """Return what all planned contours take together, and the moves between them."""
-    each = [spent_on(outcome.job, cut) for cut in outcome.cuts if cut.plan is not None]
+def spent_on_all(outcome: JobResult, each: Sequence[Spent]) -> Spent:
+    """Return what all planned contours take together, and the moves between them.
+
+    `each` is what every one of them takes.
+    """
     air, cost = None if outcome.part is None else outcome.part.air_time, None
     if (prices := outcome.job.cost) is not None:
         costs = [one.cost for one in each if one.cost is not None]
@@ -219,7 +221,8 @@ def spent_table(outcome: JobResult) -> tuple[list[tuple[str, str]], list[list[st
     if "process" not in job.source and job.cost is None:
         return [], []
     cuts = [cut for cut in outcome.cuts if cut.plan is not None]
-    spent = [*(spent_on(job, cut) for cut in cuts), spent_on_all(outcome)]
+    each = [spent_on(job, cut) for cut in cuts]
+    spent = [*each, spent_on_all(outcome, each)]
     currency = "" if job.cost is None else job.cost.currency
     columns: list[tuple[str, str, list[float | None], int]] = [
         ("Cutting", "s", [one.cutting for one in spent], 2),
