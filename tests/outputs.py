@@ -313,7 +313,7 @@ def refusals(shop: Workshop) -> None:
     for name, text in jobs.items():
         shop.input("job.toml", text)
         shop.run("check job.toml", f"job {name}")
-    shop.input("plan.json", '{"schema": 9}')
+    shop.input("plan.json", '{"schema": 10}')
     shop.input("old.json", '{"schema": 1, "kerfpath": "0.0.1"}')
     shop.input("broken.step", "ISO-10303-21;\nHEADER;\n")
     shop.input("empty.mod", "MODULE nothing\nENDMODULE\n")

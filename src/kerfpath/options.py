@@ -27,6 +27,7 @@ __all__ = [
     "BetweenNodes",
     "FeedKind",
     "GraphKeywords",
+    "Interpolation",
     "Interruptions",
     "OptionConflict",
     "PlanKeywords",
@@ -41,6 +42,7 @@ PlanMethod = Literal["continuous", Method]
 FeedKind = Literal["constant", "dip"]
 Interruptions = Literal["none", "fewest"]
 BetweenNodes = Literal["reported", "kept", "guaranteed"]
+Interpolation = Literal["linear", "joint"]
 
 
 class GraphKeywords(TypedDict, total=False):
@@ -66,6 +68,7 @@ class PlanKeywords(GraphKeywords, total=False):
     closure: Closure
     rotation: ArrayLike | None
     feed: FeedKind
+    interpolation: Interpolation
     refine: bool
     restarts: int
     certify: Certify | None
@@ -208,6 +211,14 @@ class PlanOptions(Settings):
         group="Feed reductions and pieces",
         label="Feed",
         concerns="search",
+    )
+    interpolation: Interpolation = setting(
+        "joint",
+        "how the controller moves between the nodes. joint: all joints evenly, so that a motion "
+        "at constant feed may pass a singularity and change its posture there. linear: the tip "
+        "straight, so that no motion that is explored changes its posture; in jobs always. Give "
+        "`kerfpath.audit` the same",
+        takes=None,
     )
     refine: bool = setting(
         False,

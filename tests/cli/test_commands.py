@@ -121,7 +121,7 @@ def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
 
 def test_plan_json_carries_everything_and_round_trips(planned, folder):
     data = json.loads((folder / "small-plan" / "plan.json").read_text())
-    assert data["schema"] == 9
+    assert data["schema"] == 10
     assert data["robot"]["id"] == "abb_irb4600_60_205"
     assert data["job"]["tool"]["head"] == "laser-head-45"
     assert np.array(data["T_flange_tip"]).shape == (4, 4)
@@ -503,8 +503,8 @@ def test_help_teaches():
         (("plan", "."), ["got a folder"]),
         (("post", "none.json"), ["none.json", "cannot be read"]),
         (("post", "small.toml"), ["not a plan.json"]),
-        (("post", "list.json"), ['expected a plan.json with schema 9, got "list"']),
-        (("post", "old.json"), ["schema 9, got 0", "plan the job again"]),
+        (("post", "list.json"), ['expected a plan.json with schema 10, got "list"']),
+        (("post", "old.json"), ["schema 10, got 0", "plan the job again"]),
         (("post", "short.json"), ["the key kerfpath is missing", "plan the job again"]),
         (("audit", "none.json"), ["cannot be read"]),
         (("audit", "small-plan/plan.json", "--job", "none.toml"), ["no such file"]),
@@ -529,7 +529,7 @@ def test_help_teaches():
 def test_bad_input_is_one_line_and_nothing_is_written(planned, folder, arguments, words):
     (folder / "list.json").write_text("[]")
     (folder / "old.json").write_text('{"schema": 0}')
-    (folder / "short.json").write_text('{"schema": 9}')
+    (folder / "short.json").write_text('{"schema": 10}')
     (folder / "wrong-loop.toml").write_text(SMALL.replace("skin/hole16", "skin/hole99"))
     (folder / "slow.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = -3", 1))
     before = sorted(folder.iterdir())

@@ -4,15 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from kerfpath import Band, Comfort, GammaWindow, Tilt, audit, plan
+from kerfpath import Band, Comfort, GammaWindow, Tilt, audit, fastest_speed, plan
+from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.courses import can_explore, ramps, smoothed, waves
+from kerfpath.planner.courses import can_explore, ramps, smoothed, varied, waves
 from kerfpath.planner.exploration import AGAIN, REFINED, REFINED_AGAIN, Exploration
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
+from kerfpath.plans import path_cost
+from kerfpath.search import Course
 from kerfpath.setup import Setup
 
 pytestmark = pytest.mark.usefixtures("explored")
@@ -27,6 +31,34 @@ def test_smoothing_leaves_a_straight_course_and_its_ends(width):
     np.testing.assert_allclose(smoothed(straight, width), straight, atol=1e-12)
     bent = straight**2
     assert smoothed(bent, width)[[0, -1]] == pytest.approx(bent[[0, -1]], abs=1e-12)
+
+
+def course(posture):
+    K = len(posture)
+    return Course(np.linspace(0, 1, K) ** 2, np.zeros((K, 6)), np.array(posture))
+
+
+def test_a_course_in_one_posture_is_also_smoothed():
+    own, smooth = varied(course([1] * 20))
+    np.testing.assert_array_equal(own.gamma, course([1] * 20).gamma)
+    np.testing.assert_array_equal(smooth.posture, own.posture)
+    assert np.abs(np.diff(smooth.gamma, 2)).max() <= np.abs(np.diff(own.gamma, 2)).max() + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("posture", "changes"),
+    [
+        ([0] * 8 + [1] * 8, {(5,), (6,), (7,), (8,), (9,)}),
+        ([0] + [1] * 9, {(0,), (1,), (2,)}),  # not before the first node
+        ([0] * 4 + [1] * 3 + [0] * 4, {(k, k + 3) for k in (1, 2, 3, 4, 5)}),
+        ([0, 1, 0, 1, 0, 1], {(0, 1, 2, 3, 4)}),  # many changes stay where they are
+    ],
+)
+def test_a_change_of_posture_also_comes_sooner_and_later(posture, changes):
+    made = varied(course(posture))
+    assert {tuple(np.flatnonzero(np.diff(each.posture))) for each in made} == changes
+    assert all(each.posture[0] == posture[0] for each in made)
+    assert all(each.posture[-1] == posture[-1] for each in made)
 
 
 def test_changes_are_as_large_as_they_are_said_to_be():
@@ -120,3 +152,52 @@ def test_an_exploration_ends_where_the_best_motion_is_found_again(
     Exploration(task, starts).run()
     assert AGAIN <= len(ends) <= most
     assert (len(ends) == AGAIN) == (share == 1.0)
+
+
+@pytest.fixture
+def passage(arm, tool):
+    """A contour, and joints along it that pass the singularity of the wrist straight."""
+    nodes, dt = 32, 0.01
+    t = (np.arange(nodes) - (nodes - 1) / 2) * dt
+    rate = np.radians([8.0, -5.0, 6.0, 0.0, 80.0, 0.0])
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.5]) + t[:, None] * rate
+    tip = arm.forward(q) @ tool
+    return Contour(tip[:, :3, 3], tip[:, :3, 2], time=np.arange(nodes) * dt), q
+
+
+@pytest.mark.slow
+def test_a_motion_straight_through_a_singularity_is_found_if_joints_move_evenly(passage, arm, tool):
+    """No motion in one posture costs less than 1.02 times as much."""
+    contour, q = passage
+    task = {"tool": tool, "placement": np.eye(4)}
+    made = plan(contour, arm, **task)
+    s = made.settings
+    known = path_cost(np.diff(q, axis=0), s.weights, s.metric, s.objective)
+    assert made.cost <= known * (1 + SAME)
+    assert set(made.posture) == {0, 1}
+    assert not [each for each in audit(made, interpolation="joint") if each.level == "error"]
+    straight = plan(contour, arm, interpolation="linear", **task)
+    assert not np.ptp(straight.posture)
+    assert straight.cost > 1.02 * known
+    assert not [each for each in audit(straight) if each.level == "error"]
+
+
+@pytest.mark.slow
+def test_the_fastest_speed_passes_a_singularity_only_if_joints_move_evenly(arm):
+    """Along this contour it is 1.18 times as fast then, and 1.21 times with all the effort."""
+    rng = np.random.default_rng(0)
+    nodes = 32
+    t = (np.arange(nodes) - (nodes - 1) / 2 + rng.uniform(-0.5, 0.5)) * 0.01
+    rate = [*rng.uniform(-30, 30, 3), 0.0, rng.uniform(20, 90), rng.uniform(-30, 30)]
+    middle = [*rng.uniform(-0.4, 0.4, 3), rng.uniform(-2, 2), 0.0, rng.uniform(-2, 2)]
+    tool = np.eye(4)
+    tool[:3, :3] = Rotation.from_euler("y", rng.uniform(0.2, 1.2)).as_matrix()
+    tool[:3, 3] = [0.15, 0.0, 0.3]
+    tip = arm.forward(np.array(middle) + t[:, None] * np.radians(rate)) @ tool
+    contour = Contour(tip[:, :3, 3], tip[:, :3, 2], time=np.arange(nodes) * 0.01)
+    task = {"tool": tool, "placement": np.eye(4), "refine": True}
+    even, straight = (
+        fastest_speed(contour, arm, interpolation=moves, **task).speed
+        for moves in ("joint", "linear")
+    )
+    assert even > 1.15 * straight

@@ -20,7 +20,8 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.auditor.chain import JointChain
-from kerfpath.auditor.motion import Interpolation, Motion, follow, joint_increments, straight
+from kerfpath.auditor.motion import Motion, follow, joint_increments, straight
+from kerfpath.options import Interpolation
 from kerfpath.plans import Plan
 
 HIDDEN_ANGLE = 1e-5

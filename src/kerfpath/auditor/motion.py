@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import factorial
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,13 +20,12 @@ from kerfpath.auditor.enclosure import fixed_poses, joints_of, require_closed_fo
 from kerfpath.auditor.jets import Interval, Jet, angle_from, constant, exact
 from kerfpath.auditor.postures import POSTURES_OF, Pose
 from kerfpath.errors import InputError
+from kerfpath.options import Interpolation
 from kerfpath.plans import Plan
 from kerfpath.robots import ExternalAxis, Robot
 
 # -----------------------------------------------------------------------------
 # The motion between the nodes of a plan, as the controller interpolates it.
-
-Interpolation = Literal["linear", "joint"]
 
 NEWTON_STEPS = 12
 """Newton's method doubles its digits each step; a pose not reached after these is not reached."""

@@ -16,13 +16,14 @@ from kerfpath.auditor.chain import chain_of
 from kerfpath.auditor.collision import collisions
 from kerfpath.auditor.dynamics import LagrangeArm
 from kerfpath.auditor.margins import margins
-from kerfpath.auditor.motion import Interpolation, Motion, joint_increments, motion_of
+from kerfpath.auditor.motion import Motion, joint_increments, motion_of
 from kerfpath.auditor.rounding import MOST_ROUNDED, Rounding
 from kerfpath.auditor.table import Check, Issues, check_worst
 from kerfpath.auditor.transfer import retract_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.options import Interpolation
 from kerfpath.plans import Plan
 from kerfpath.robots import require_axes
 

@@ -349,7 +349,7 @@ class PlanDocument(TypedDict):
 # -----------------------------------------------------------------------------
 # Check a plan.json against its layout: every key and every value, as strictly as JSON allows.
 
-SCHEMA = 9
+SCHEMA = 10
 """Version of the layout of plan.json; it grows if readers of the old one would misread the file."""
 LARGEST_NUMBER = 1e12
 """Largest number of a plan, in SI; not even the sum of all counts is larger."""

@@ -6,8 +6,9 @@ the joints, along all nodes and along every few: the fewer nodes, the larger the
 beside which samples and kinks are fine. Motions that are known are changed by waves and smooth
 steps of gamma. All are screened together.
 
-Only courses in one posture are used. Between two nodes of different postures the arm passes a
-singularity; where the tip keeps to the path there, the joints turn much faster than at the nodes.
+A course may change its posture if the controller moves all joints evenly: the arm passes a
+singularity between two nodes. If the tip moves straight, the joints turn much faster there than at
+the nodes, so only courses in one posture are used.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ SLACK = 1.02
 """Factor of (5) along every few nodes, for contours whose intervals do not divide evenly."""
 COURSES = 40
 """Most courses along the same nodes."""
+SOONER_OR_LATER = range(-2, 3)
+"""Nodes by which a change of posture is moved along a course: its place is rough."""
+MOST_CHANGES = 2
+"""Changes of posture from which on their places stay as they are."""
 ANGLES = 36
 """Angles at which gamma is constant along further courses, in every posture: where (6) binds, the
 best motion may hardly turn."""
@@ -100,6 +105,7 @@ class Courses:
             aim=aim,
         )
         self._allowed = _postures_of(task)
+        self._one_posture = s.interpolation == "linear" or s.feed == "dip"
         self._rng = np.random.default_rng(SEED)
 
     @property
@@ -164,8 +170,7 @@ class Courses:
         courses = self._constant()
         for through, nodes in valleys:
             for course in islice(self._through(through, nodes), COURSES):
-                width = max(2, len(course.gamma) // SMOOTHED)
-                courses += [course, course._replace(gamma=smoothed(course.gamma, width))]
+                courses += varied(course)
         return courses
 
     def cheapest(self) -> Iterator[Course]:
@@ -205,12 +210,15 @@ class Courses:
     ) -> list[tuple[float, Course]]:
         """Return the motions that courses are screened to, each way, with scores, best first.
 
-        Courses that change posture, or to one that is not allowed, are left out.
+        Courses in postures that are not allowed are left out, and changes of posture if the tip
+        moves straight.
         """
+        every = np.arange(len(self._frames))
         courses = [
             course
             for course in courses
-            if not np.ptp(course.posture) and self._allowed[:, course.posture[0]].all()
+            if self._allowed[every, course.posture].all()
+            and not (self._one_posture and np.ptp(course.posture))
         ]
         found = [c for stages in ways for c in self._screening.screened(courses, stages)]
         if not found:
@@ -251,6 +259,26 @@ def _spread(course: Course, nodes: Ints, count: int) -> Course:
         q=np.stack([np.interp(at, nodes, joint) for joint in course.q.T], axis=1),
         posture=course.posture[nearest],
     )
+
+
+def varied(course: Course) -> list[Course]:
+    """Return a course, and smoothed ones; one that changes posture also does so sooner and later.
+
+    One with more than `MOST_CHANGES` is returned alone.
+    """
+    changes, K = np.flatnonzero(np.diff(course.posture)), len(course.gamma)
+    if not changes.size:
+        return [course, course._replace(gamma=smoothed(course.gamma, max(2, K // SMOOTHED)))]
+    courses = [course]
+    for shift in SOONER_OR_LATER if changes.size <= MOST_CHANGES else ():
+        moved = changes + shift
+        if moved[0] < 0 or moved[-1] >= K - 1:
+            continue
+        posture = course.posture[np.append(changes, K - 1)].repeat(
+            np.diff(np.append(moved, K - 1), prepend=-1)
+        )
+        courses += [Course(smoothed(course.gamma, width), course.q, posture) for width in (2, 5)]
+    return courses
 
 
 def smoothed(gamma: Array, width: int) -> Array:

@@ -15,7 +15,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
+from kerfpath.options import GraphKeywords, Interpolation, PlanOptions, with_keywords
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.external_motion import along_a_course, faster_motions
 from kerfpath.planner.impossible import binding_nodes, impossible_share
@@ -38,6 +38,7 @@ class SpeedKeywords(GraphKeywords, total=False):
 
     eta_v: float
     eta_a: float
+    interpolation: Interpolation
     refine: bool
 
 
@@ -104,11 +105,11 @@ def fastest_speed(
         As in `plan`. Without `external`, external axes and the elbow of a seven-axis arm follow the
         gentlest course.
     options : PlanOptions, optional
-        Only gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter, which are
-        also keywords. The grid quantises the acceleration, so `refine` moves gamma and external
-        axes off it, from the fastest path and from others, to faster motions that are clear and
-        keep the margins of `comfort`, which may have no costs here. The result is the best motion
-        found, not proved to be the best.
+        Only gamma_step, frames, tilt, postures, comfort, eta_v, eta_a, interpolation and refine
+        matter, which are also keywords. The grid quantises the acceleration, so `refine` moves
+        gamma and external axes off it, from the fastest path and from others, to faster motions
+        that are clear, can be followed between the nodes, and keep the margins of `comfort`, which
+        may have no costs here. The result is the best motion found, not proved to be the best.
     ceiling : bool
         Whether to prove, with a limited amount of work, from which speed on there is no motion at
         all, on the grid or off it; see `FastestSpeed.ceiling`.

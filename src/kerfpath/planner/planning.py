@@ -342,9 +342,9 @@ def plan(
 def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tuple[Plan, Attempt]:
     """Return the plan of a task, and the attempt that found it.
 
-    Where the motion found changes its posture between two nodes, it is the quickest and then the
-    cheapest motion found in one posture. If there is none, a motion at constant speed stays as it
-    is, for its audit to judge.
+    Where the controller cannot follow the motion found between two nodes, it is the quickest and
+    then the cheapest motion found in one posture. If there is none, a motion at constant speed
+    stays as it is, for its audit to judge.
 
     Raises
     ------

@@ -14,6 +14,7 @@ from kerfpath.kernels.metric import wrap
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import Courses, can_explore
 from kerfpath.planner.screening import QUICK
+from kerfpath.planner.straight_moves import not_followed
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
@@ -47,10 +48,11 @@ HOPELESS = 1.5
 """A screened motion that needs this many times the best interval is left."""
 ROUNDS = 2
 """Times that the best motion is shaken."""
+FAR = 2.0
+"""Multiple of a wanted interval from which on valleys are not explored: they hardly gain it."""
 NEAR, CLOSE = 1.25, 1.05
-"""Multiples of a wanted interval: from the first on, valleys are not explored, which gains 20 % at
-most; from the second on, only the first search of each kind is made over many nodes, which gains
-most of it."""
+"""Multiples of a wanted interval from which on only the first search of each kind is made, which
+gains most; the second over many nodes."""
 MANY = 200
 """Nodes from which on a search of each kind takes several seconds."""
 MOST_SEARCHES = 40
@@ -120,7 +122,7 @@ def quick_motions(
         for found in _by_beam(task, finder, best, factor, tried):
             best = found
             yield best
-    if explore and best.dt <= NEAR * wanted:
+    if explore and best.dt <= (NEAR if len(task.contour) >= MANY else FAR) * wanted:
         for found in _through_valleys(
             task, finder, best, factor=FACTORS[0], known=known, enough=enough
         ):
@@ -306,7 +308,9 @@ def _at_least_interval(start: Plan) -> tuple[Plan, Binding] | None:
 
 
 def _allowed(task: Task, finder: CollisionFreeSearch, made: Plan) -> bool:
-    """Return whether a motion keeps the margins of comfort and is clear."""
+    """Return whether the arm follows a motion, which keeps the margins of comfort and is clear."""
+    if not_followed(made) is not None:
+        return False
     comfort = task.settings.comfort
     if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
         return False

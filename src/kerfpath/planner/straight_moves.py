@@ -1,9 +1,10 @@
-"""Straight moves from node to node: whether the arm follows them, and the time that they take.
+"""Moves from node to node: whether the arm follows them, and the time that they take.
 
 A search joins nodes by the change of each joint. Where the tool axis jumps, as at a sharp edge of a
 sheet, or where nodes are far apart in time, the ends of a change may lie on two branches of the
 arm: on the straight move between them the joints would have to leap. Near a singularity they can
-follow it, but are faster on the way than the change from node to node says.
+follow it, but are faster on the way than the change from node to node says. A controller that moves
+all joints evenly passes the singularity, and the tip hardly leaves the line there.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, Ints
+from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, base_in_part
+from kerfpath.tolerances import LIMIT_MARGIN
 
 PARTS, FINE = 16, 256
 """Numbers of parts of a move at whose ends the joints are solved: first, and where they do not run
@@ -26,6 +28,9 @@ UNEVEN = 1.1
 LEAP = np.radians(45)
 """rad: a joint that changes by more in one of these parts has left its branch, or passes so near a
 singularity that the arm would nearly stop there."""
+NEAR_TIP, NEAR_AXIS = 1e-4, np.radians(1.0)
+"""m and rad: even moves of the joints that leave the straight move by no more follow it, as in an
+audit of such moves."""
 
 
 def largest_steps(contour: Contour, robot: Robot) -> Array:
@@ -97,10 +102,22 @@ def follows(made: Plan) -> bool:
 
 
 def not_followed(made: Plan) -> NoFeasiblePath | None:
-    """Return the answer that the arm cannot follow a straight move of a plan; None if it can."""
-    leaps = np.flatnonzero(np.isinf(least_times(made)))
-    if made.settings.feed == "constant" and leaps.size:  # a singularity is no matter of time there
-        leaps = leaps[np.isinf(_times_in_parts(made, leaps, FINE))]
+    """Return the answer that the arm cannot follow a move of a plan; None if it can.
+
+    At constant feed it cannot if the joints would have to leap; if they move evenly, and the tip
+    keeps near the line, they need not. If the tip moves straight through a change of posture, they
+    must also be fast enough, which near the singularity they seldom are.
+    """
+    least, asked = least_times(made), made.settings
+    lost = np.isinf(least)
+    if asked.feed == "constant":
+        least[lost] = _times_in_parts(made, np.flatnonzero(lost), FINE)
+        lost = np.isinf(least)  # seen closer, the joints may only be very fast
+        if asked.interpolation == "joint":
+            lost[lost] = ~_near_the_line(made, np.flatnonzero(lost))
+        else:
+            lost |= (np.diff(made.posture) != 0) & (least > np.diff(made.time) * (1 + LIMIT_MARGIN))
+    leaps = np.flatnonzero(lost)
     if not leaps.size:
         return None
     k = int(leaps[0])
@@ -111,6 +128,19 @@ def not_followed(made: Plan) -> NoFeasiblePath | None:
         node=k,
         counts={Reason(Loss.LEAP): len(leaps)},
     )
+
+
+def _near_the_line(made: Plan, moves: Ints) -> Bools:
+    """Return whether the tip stays near the straight move, (M,), where all joints move evenly."""
+    f = np.linspace(0.0, 1.0, PARTS + 1)[:, None, None]
+    tool = made.robot.forward(made.q[moves] + f * made.increments[moves]) @ made.T_flange_tip
+    tip, axis = tool[..., :3, 3], tool[..., :3, 2]
+    along = tip[-1] - tip[0]
+    way = tip - tip[0]
+    share = (way * along).sum(axis=-1, keepdims=True) / (along**2).sum(axis=-1)[:, None]
+    off = np.linalg.norm(way - np.clip(share, 0.0, 1.0) * along, axis=-1).max(axis=0)
+    turned = angle_between(axis, axis[0] + f * (axis[-1] - axis[0])).max(axis=0)
+    return np.asarray((off <= NEAR_TIP) & (turned <= NEAR_AXIS))
 
 
 def remedy(contour: Contour) -> str:

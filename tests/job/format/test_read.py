@@ -49,7 +49,7 @@ language = "rapid"
 ACCELERATION = "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]"
 HEAD = 'head = "laser-head-straight"'
 FOR_PROGRAMS = {"comfort": Comfort(limits=Band(margin=0.1 * np.radians(1))), "retract": 0.05}
-FOR_PROGRAMS |= {"floor": 0.0, "between_nodes": "kept"}
+FOR_PROGRAMS |= {"floor": 0.0, "between_nodes": "kept", "interpolation": "linear"}
 """What every job asks for, so that its plans can be run as programs."""
 
 

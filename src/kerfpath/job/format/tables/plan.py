@@ -51,7 +51,7 @@ class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions
         OptionConflict
             Two options conflict.
         """
-        values = self.si(PlanOptions) | others
+        values = self.si(PlanOptions) | {"interpolation": "linear"} | others
         if self.posture is not None:
             values["postures"] = postures_named(self.posture, robot.kinematics)
         if self.rotation_deg is not None:
