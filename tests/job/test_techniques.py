@@ -491,3 +491,31 @@ def test_gases_without_an_output_of_their_own_are_refused(tmp_path, old, new, wo
     with pytest.raises(InputError) as caught:
         require_foreseen(prepare(read_job(tmp_path / "job.toml")))
     assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rapid", "krl", "inform"])
+def test_controllers_that_follow_the_speed_have_the_power_of_each_technique(
+    planned, tmp_path, name
+):
+    """The slope of the hole is that of 1500 W of 3000 W; with that of the slit it is caught."""
+    _draw(tmp_path / "points.csv")
+    line = "power_by_speed = [[0.0, 0.0], [1.0, 1.0]]\n"
+    text = job_text(name).replace("power_by_speed = [[0.0, 0.3], [1.0, 1.0]]\n", line)
+    text = text.replace("power_w = 1500\n", f"power_w = 1500\n{line}")
+    text = text.replace("[program]\n", '[program]\npower_follows = "controller"\n')
+    if name not in POWERED:
+        text = text.replace(table := f"[program.{name}]\n", table + POWER[name])
+    (tmp_path / "job.toml").write_text(text)
+    audit = Audit.of(tmp_path / "job.toml")
+    options, plans = audit.expected.job.program, planned[name][0].plans
+    subject = subject_of(audit, plans, options)
+    assert subject.outcome(subject.files) == ("passed", "")
+    slopes = [s.per_speed for s in subject.read(subject.files).steps if isinstance(s, ReadPower)]
+    hole, slit = (slope for slope in slopes if slope)
+    assert hole * 3 / 60 == pytest.approx(0.5, abs=2e-3)
+    assert slit * 4 / 60 == pytest.approx(1.0, abs=2e-3)
+    hole_own = options.contours["hole"] | {"power_by_speed": ((0.0, 0.0), (1.0, 1.0))}
+    changed = replace(options, contours={**options.contours, "hole": hole_own})
+    edited = subject_of(audit, plans, changed)
+    assert subject.outcome(edited.files)[0] == "caught"
