@@ -1,11 +1,12 @@
 """Tubes: no bound above a motion in them, and none left open where the work allows it."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kerfpath import Certify, plan
+from kerfpath import Certify, audit, plan
 from kerfpath.certificate import LEAST_GAP
 from kerfpath.certifier import bound as proving
 from kerfpath.certifier import certify
@@ -13,6 +14,7 @@ from kerfpath.certifier.cells import cell_maker
 from kerfpath.certifier.tubes import Tubes
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner import planning
 
 SPEED = 0.96
 """m/s: 0.8 of the fastest at which the arc has a plan; (6) binds at nearly all of its nodes."""
@@ -36,7 +38,15 @@ def tubes_of(one):
     steps = proving._steps_of(one)
     maker = cell_maker(one, steps.weight)
     nodes = np.arange(len(one.q))
-    made = Tubes(maker, steps, nodes, cost=one.cost, target=one.cost, enough=lambda *_: False)
+    made = Tubes(
+        maker,
+        steps,
+        nodes,
+        cost=one.cost,
+        target=one.cost,
+        enough=lambda *_: False,
+        cheaper=lambda _: np.inf,
+    )
     cells = maker.coarsest(nodes)
     return made, cells.take(cells.posture == one.posture[0]), steps
 
@@ -154,3 +164,33 @@ def test_no_motion_of_other_starts_costs_less_than_the_bound(nodes, short):
 
 def test_a_gap_of_nothing_can_be_asked_for():
     assert Certify(gap=0).gap == 0.0
+
+
+@pytest.fixture(scope="module")
+def dear(short):
+    """Return a plan in the second best posture, which may use all, and the best plan."""
+    best, found = short(6), []
+    for posture in range(8):
+        with suppress(NoFeasiblePath):
+            found.append(short(6, postures=(posture,)))
+    worse = min((one for one in found if one.cost > 1.001 * best.cost), key=lambda one: one.cost)
+    return replace(worse, settings=best.settings), best
+
+
+def test_a_plan_takes_the_cheaper_motion_and_keeps_the_bound(
+    dear, arc, arm, tool, placement, monkeypatch
+):
+    """More time never gives a worse plan, and the gap is that of the cost and the bound."""
+    made, best = dear
+    first = planning._planned
+    monkeypatch.setattr(planning, "_planned", lambda *args: (made, first(*args)[1]))
+    part = Contour(arc.points[:6], arc.axes[:6], closed=False, name="part")
+    asked = Certify(gap=0, seconds=60)
+    better = plan(part, arm, tool=tool, placement=placement, speed=SPEED, certify=asked)
+    proof = better.proof
+    assert better.cost == pytest.approx(best.cost, rel=1e-4)
+    assert proof.bound <= better.cost
+    assert proof.gap == pytest.approx((better.cost - proof.bound) / better.cost, abs=1e-12)
+    assert proof.statement.count("no motion within the limits costs less") == 1
+    assert audit(better) == []
+    assert better.settings.certify == asked

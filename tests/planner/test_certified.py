@@ -23,7 +23,7 @@ def asked(monkeypatch):
     """Stand in for the certifier, which proves 0.9 of every cost: what it is asked for."""
     calls = []
 
-    def certify(made, *, gap, seconds, checkable, most, progress):
+    def certify(made, *, gap, seconds, checkable, most, progress, refined):
         calls.append((made, gap, seconds))
         progress("cells", 1, 2)
         proof = replace(made.proof, bound=0.9 * made.cost, gap=0.1)

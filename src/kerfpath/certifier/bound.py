@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import monotonic
@@ -31,7 +31,7 @@ from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.plans import OF_BOUND, Plan
 from kerfpath.progress import Progress, StopEarly, no_progress
-from kerfpath.search import METRIC_CODES
+from kerfpath.search import METRIC_CODES, Course
 
 TURNED = 3e-4
 """Share of its cost that the plan may lose with straight steps between the nodes of the first
@@ -89,7 +89,8 @@ class Certified:
     Parameters
     ----------
     plan : Plan
-        The plan, with `proof.bound`, `gap` and `certificate` if a bound is proved.
+        The plan, with `proof.bound`, `gap` and `certificate` if a bound is proved; or a cheaper one
+        that the proof came upon.
     done : bool
         Whether the gap asked for is reached.
     statement : str
@@ -146,6 +147,7 @@ def certify(
     checkable: bool = True,
     most: float | None = None,
     progress: Progress = no_progress,
+    refined: Callable[[Course], Plan | None] | None = None,
 ) -> Certified:
     """Return the plan with a proved lower bound on the cost of any motion along its contour.
 
@@ -173,6 +175,9 @@ def certify(
         nodes. Objective "sum" only.
     progress : Progress
         Called with the progress of the proof.
+    refined : callable, optional
+        Returns the plan that a motion cheaper than the plan leads to, None for none. The proof
+        comes upon such motions where it divides motions into tubes; then it is about that plan.
 
     Raises
     ------
@@ -206,7 +211,7 @@ def certify(
         best, rounds, pairs = wide_bound(plan, steps, gap, spent, progress)
         best = max(best, _lever_bound(plan, steps))
         return _certified(plan, best, gap, None, rounds, pairs, more)
-    certification = _Certification(plan, steps, gap, until, most, checkable, progress)
+    certification = _Certification(plan, steps, gap, until, most, checkable, progress, refined)
     try:
         certification.run()
     except StopEarly:  # a certificate must be whole
@@ -214,7 +219,13 @@ def certify(
             raise
     stages = tuple(certification.stages) if checkable else None
     return _certified(
-        plan, certification.best, gap, stages, certification.count, certification.pairs, more
+        certification.plan,
+        certification.best,
+        gap,
+        stages,
+        certification.count,
+        certification.pairs,
+        more,
     )
 
 
@@ -295,6 +306,7 @@ class _Certification:
         most: float,
         checkable: bool,
         progress: Progress,
+        refined: Callable[[Course], Plan | None] | None = None,
     ) -> None:
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME_COST, 1.0)
         folded = foldable(plan.robot, steps.velocity)
@@ -318,7 +330,7 @@ class _Certification:
             self.first_order.add(int(plan.posture[0]), plan.gamma, plan.increments)
         self.at_node = 0.0  # cells of level 0
         self.stages: list[Stage] = []
-        self.plan, self.checkable = plan, checkable
+        self.plan, self.checkable, self.refined = plan, checkable, refined
         self.by_fewer = 0.0  # the bound by fewer nodes; a stage that proves less lacks finer cells
         self.potential = 0.0  # what it is expected to reach at the first layer
         self.proved = 0.0  # by the stages that are kept
@@ -536,8 +548,20 @@ class _Certification:
             cost=self.cost,
             target=self.target,
             enough=enough,
+            cheaper=self._cheaper,
         )
-        self._took(tubes, min(tubes.bound(parts.left), self.target))
+        bound = tubes.bound(parts.left)
+        self._took(tubes, min(bound, self.target))
+
+    def _cheaper(self, course: Course) -> float:
+        """Take the plan that a course leads to if it costs less; return its cost, or infinity."""
+        every = len(self.nodes) == self.last + 1
+        other = self.refined(course) if every and self.refined is not None else None
+        if other is None or other.cost >= self.cost:
+            return np.inf
+        self.target *= other.cost / self.cost
+        self.plan, self.cost = other, other.cost
+        return other.cost
 
     def _took(self, parts: Parts | Tubes, bound: float) -> None:
         """Update bound and work with those of parts."""

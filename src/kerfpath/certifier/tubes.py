@@ -34,6 +34,7 @@ from kerfpath.certifier.stages import ROUNDED, StageResult, Steps, solve_stage
 from kerfpath.conic import ConicSolution, NonnegativeConeT, minimise
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.kernels.reduced import excess
+from kerfpath.search import Course
 
 ACROSS = 16
 """Cells of a node below which all of them are halved."""
@@ -48,6 +49,8 @@ TANGENTS = -1.0, -0.6, -0.25, 0.25, 0.6, 1.0
 """Where on the parabola, in half-widths, the squares are held from below."""
 AGAIN, ROUNDS = 0.8, 4
 """Share of its cells that a tube must lose to be bounded again, undivided, and how often."""
+NEARLY = 1.02
+"""Most of the limits that a motion of a program may need to be refined."""
 PROGRAM_PAIRS = 400
 """Number of steps from cell to cell that take as long as a program, for each of its nodes."""
 UNIT = 2.0**-52
@@ -222,6 +225,9 @@ class Tubes:
         Cost of the plan, and the bound to reach.
     enough : callable
         Takes the number of steps bounded and of cells held; returns whether to stop.
+    cheaper : callable
+        Takes a motion that seems to cost less than the plan and nearly keeps the limits; returns
+        the cost of the plan that it leads to, which then counts, or infinity.
     """
 
     def __init__(
@@ -233,6 +239,7 @@ class Tubes:
         cost: float,
         target: float,
         enough: Callable[[int, int], bool],
+        cheaper: Callable[[Course], float],
     ) -> None:
         self._maker, self._steps, self._nodes = maker, steps, nodes
         self._program = _Program(steps, nodes)
@@ -241,6 +248,7 @@ class Tubes:
         self._number, self._held = count(), 0
         self._open: list[tuple[float, int, _Part]] = []
         self._closed = cost
+        self._cheaper, self._tried = cheaper, cost * (1 - SAME_COST)
         self.pairs, self.count = 0, 0
 
     def bound(self, sets: Sequence[tuple[float, CellSet]]) -> float:
@@ -278,6 +286,7 @@ class Tubes:
                     return
                 found = None
             else:
+                self._look_at(found.gamma, cells)
                 own = tube.least(self._steps, self._program.spans, found.y, found.nu)
                 known = max(known, own)
                 if self._close(known):
@@ -308,6 +317,28 @@ class Tubes:
                 self._closed = min(self._closed, least)
             for each in halves:
                 self._wait(least, _Part(each, duals=duals))
+
+    def _look_at(self, gamma: Array, cells: CellSet) -> None:
+        """Take the plan of a motion with gamma (M,) in the posture of cells if it costs less."""
+        posture = int(cells.posture[0])
+        q, _, reached = self._maker.joints(self._nodes, gamma, posture)
+        if not reached.all():
+            return
+        u = np.diff(q, axis=0)
+        u -= np.where(self._maker.turns, TURN * np.rint(u / TURN), 0.0)
+        spans, steps = self._program.spans[:, None], self._steps
+        bent = np.diff(u / spans, axis=0) / ((spans[:-1] + spans[1:]) / 2)
+        fast = np.abs(u / spans / steps.velocity).max()
+        sharp = np.abs(bent / steps.acceleration).max(initial=0.0)
+        cost = float(steps.distance(u).sum())
+        if cost >= self._tried or max(fast, sharp) > NEARLY:
+            return
+        course = np.concatenate([q[:1], q[0] + np.cumsum(u, axis=0)])
+        reached_cost = self._cheaper(Course(gamma, course, np.full(len(q), posture)))
+        self._tried = min(cost, reached_cost) * (1 - SAME_COST)
+        if reached_cost < self._cost:
+            self._target *= reached_cost / self._cost
+            self._cost, self._closed = reached_cost, min(self._closed, reached_cost)
 
     def _close(self, known: float) -> bool:
         """Return whether the bound of a tube suffices, so that it need not be divided."""

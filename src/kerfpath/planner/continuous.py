@@ -27,7 +27,7 @@ from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import StopEarly
 from kerfpath.refiner import Refinement
-from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch
+from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch, Course
 
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """`BeamWidth.alike` for paths that hardly accelerate, and for paths that must."""
@@ -104,6 +104,20 @@ def better_motion(attempt: Attempt) -> Plan | None:
     if starts.best.cost_after > (1 - BETTER) * before:
         return None
     return claimed(starts.best, attempt.finder)
+
+
+def refined_course(attempt: Attempt, course: Course) -> Plan | None:
+    """Return the plan that a course from elsewhere is refined to; None if that fails.
+
+    It is for plans at a constant speed over continuous gamma.
+    """
+    task = attempt.task.whole()
+    asked = task.settings
+    if asked.method != "continuous" or asked.feed != "constant" or grid_reason(task):
+        return None
+    starts = Starts(task, attempt.finder)
+    starts.refine_course(course, np.inf)
+    return None if starts.best is None else claimed(starts.best, attempt.finder)
 
 
 def motion_from_grid(attempt: Attempt) -> Plan | None:

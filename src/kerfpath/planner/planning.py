@@ -30,6 +30,7 @@ from kerfpath.planner.continuous import (
     claimed,
     clear_motion,
     grid_reason,
+    refined_course,
 )
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
 from kerfpath.planner.folding import all_within_ranges, unfolded, within_ranges
@@ -158,6 +159,7 @@ def with_bound(
     work: SharedWork | None = None,
     phase: Callable[[str], None] | None = None,
     progress: Progress = no_progress,
+    refined: Callable[[Course], Plan | None] | None = None,
 ) -> Plan:
     """Return the plan with a proved bound, or with the reason why there is none.
 
@@ -174,6 +176,9 @@ def with_bound(
         Called with "certificate" when this begins.
     progress : callable
         As `kerfpath.certifier.certify` calls it.
+    refined : callable, optional
+        Returns the plan that a cheaper motion leads to, which the proof came upon; it takes the
+        place of `made`.
     """
     settings = replace(made.settings, certify=asked)
     if asked is None:
@@ -181,23 +186,25 @@ def with_bound(
     if phase is not None:
         phase("certificate")
     finish_compiling()
+    begun = replace(made, proof=made.proof.without_bound())
     try:
         found = certify(
-            made,
+            begun,
             gap=asked.gap,
             seconds=asked.seconds,
             checkable=asked.keep,
             most=None if work is None else work.share,
             progress=progress,
+            refined=refined,
         )
     except StopEarly:
-        proof = made.proof.without_bound().also("stopped before a bound was proved")
+        proof = begun.proof.also("stopped before a bound was proved")
         return replace(made, settings=settings, proof=proof)
     if work is not None:
         work.take(found.pairs)
     proof = replace(
         found.plan.proof,
-        statement=f"{made.proof.without_bound().statement}; {found.statement}",
+        statement=f"{found.plan.proof.statement}; {found.statement}",
         certificate=found.plan.proof.certificate if asked.keep else None,
     )
     return replace(found.plan, settings=settings, proof=proof)
@@ -325,18 +332,29 @@ def plan(
         made = within_ranges(robot, planned)
     except NoFeasiblePath as broken:
         raise add_window_note(broken, asked) from None
-    made = with_bound(made, asked.certify, phase=phase)
+    assert attempt is not None, "the plan is of an attempt"
+    made = with_bound(
+        made, asked.certify, phase=phase, refined=partial(_refined, attempt=attempt, robot=robot)
+    )
     if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
         return made
     if not robot.encloses or asked.tilt is not None or made.feed is not None:
         return made  # such a bound is too loose to call for more
-    assert attempt is not None, "the plan is of an attempt"
     with suppress(StopEarly):
         better = better_motion(attempt)
         if better is not None:
             better, beyond = unfolded(better, robot)
             made = made if beyond.any() else with_bound(better, asked.certify, phase=phase)
     return made
+
+
+def _refined(course: Course, *, attempt: Attempt, robot: Robot) -> Plan | None:
+    """Return the plan that a cheap motion leads to; None if it is not clear or within limits."""
+    found = refined_course(attempt, course)
+    if found is None:
+        return None
+    made, beyond = unfolded(found, robot)
+    return None if beyond.any() else made
 
 
 def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tuple[Plan, Attempt]:
