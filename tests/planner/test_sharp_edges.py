@@ -29,8 +29,10 @@ def _over_an_edge(seed: int) -> tuple[Contour, np.ndarray]:
     return Contour(points, axes, name="edge"), placement
 
 
-@pytest.mark.parametrize("feed", ["dip", "constant"])
-def test_a_planned_cut_over_a_sharp_edge_passes_its_audit(feed):
+@pytest.mark.parametrize(
+    ("feed", "moves"), [("dip", "linear"), ("constant", "linear"), ("constant", "joint")]
+)
+def test_a_planned_cut_over_a_sharp_edge_passes_its_audit(feed, moves):
     arm = robot("abb_irb4600_60_205").with_limits(acceleration=[5.0, 5, 5, 20, 20, 20])
     tool = np.eye(4)
     tool[:3, 3] = 0.1, 0.0, 0.3
@@ -38,12 +40,14 @@ def test_a_planned_cut_over_a_sharp_edge_passes_its_audit(feed):
     for seed in range(16):
         contour, placement = _over_an_edge(seed)
         where = {"tool": tool, "placement": placement, "gamma_step": np.radians(10)}
+        where |= {"feed": feed, "interpolation": moves}
         try:
-            made = plan(contour, arm, speed=0.002, feed=feed, certify=None, **where)
+            made = plan(contour, arm, speed=0.002, certify=None, **where)
         except NoFeasiblePath:
             continue
         planned += 1
-        assert [issue for issue in audit(made, axis_tolerance=3.0) if issue.code in STRAIGHT] == []
+        found = audit(made, interpolation=moves, axis_tolerance=3.0)
+        assert [issue for issue in found if issue.code in STRAIGHT] == []
         assert follows(made)
         assert (np.diff(made.time) >= least_times(made) * (1 - 1e-9)).all() or feed == "constant"
     assert planned >= 4

@@ -18,7 +18,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, base_in_part
-from kerfpath.tolerances import LIMIT_MARGIN
+from kerfpath.tolerances import LIMIT_MARGIN, SAME_POINT
 
 PARTS, FINE = 16, 256
 """Numbers of parts of a move at whose ends the joints are solved: first, and where they do not run
@@ -137,7 +137,8 @@ def _near_the_line(made: Plan, moves: Ints) -> Bools:
     tip, axis = tool[..., :3, 3], tool[..., :3, 2]
     along = tip[-1] - tip[0]
     way = tip - tip[0]
-    share = (way * along).sum(axis=-1, keepdims=True) / (along**2).sum(axis=-1)[:, None]
+    length = np.maximum((along**2).sum(axis=-1, keepdims=True), SAME_POINT**2)
+    share = (way * along).sum(axis=-1, keepdims=True) / length
     off = np.linalg.norm(way - np.clip(share, 0.0, 1.0) * along, axis=-1).max(axis=0)
     turned = angle_between(axis, axis[0] + f * (axis[-1] - axis[0])).max(axis=0)
     return np.asarray((off <= NEAR_TIP) & (turned <= NEAR_AXIS))
