@@ -18,7 +18,7 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.robots import posture_name
 from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 
-HOPELESS = 4.0
+HOPELESS = 2.0
 """If no path on the grid keeps the velocities in this multiple of the node interval, no motion is
 as quick as asked for, and the exact fastest path is not worth minutes."""
 FIRST, NEARLY = 2, 1.15

@@ -55,6 +55,8 @@ NEAR, CLOSE = 1.25, 1.05
 gains most; the second over many nodes."""
 MANY = 200
 """Nodes from which on a search of each kind takes several seconds."""
+FEW_EDGES = 0.1
+"""Share of the most edges of an exact search up to which it is made for a speed far too high."""
 MOST_SEARCHES = 40
 """Most searches for paths that are clear."""
 
@@ -237,7 +239,7 @@ def velocity_limited_motions(
     """
     slow = without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
-    if edges_allowed(slow.problem, path.dt) <= current_effort().exact_edges:
+    if edges_allowed(slow.problem, path.dt) <= FEW_EDGES * current_effort().exact_edges:
         yield from quick_motions(task, finder, wanted=wanted)
         return
     task, best = slow, _along(slow, path)

@@ -23,6 +23,8 @@ CORRECTIONS = 3
 """Most corrections of a step, through the joints it reached, before it is shortened."""
 CONVERGED = 1e-4
 """Relative gain promised by the model below which a descent has converged."""
+LEAST_EXCESS = 0.1
+"""Excess that this gain is relative to where there is less: it may be 0."""
 INSIDE, SURE = 0.9, 1e-6
 """Share of the radius, and error of the model relative to the value: a step that stays below both
 ends the descent, as the model is convex and a larger radius would lead to the same place."""
@@ -216,7 +218,9 @@ class Descent:
             step = self._step(at, radius, target)
             programs += step.programs
             gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)
-            if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
+            size = abs(at.value(target))
+            size = max(size, LEAST_EXCESS) if target == "excess" else size
+            if step.to is not None and step.promised <= CONVERGED * size:
                 at = step.to if gained > 0 else at
                 if WIDER * radius > min(self.radius, failed):
                     break
