@@ -238,6 +238,15 @@ def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placeme
         assert errors(motion.plan) == []
 
 
+def test_what_stays_out_of_a_range_is_not_quickened(arm, space):
+    """A joint that no gamma brings back into its range; without a limit there, it is quickened."""
+    made = plan(drawn(0), arm, speed=0.2, **space)
+    assert refiner.quicken(made) is not None
+    upper = arm.upper.copy()
+    upper[1] = made.q[:, 1].min() - 1.0
+    assert refiner.quicken(replace(made, robot=arm.with_limits(upper=upper))) is None
+
+
 def test_what_is_out_of_reach_is_not_quickened(arm, space):
     made = plan(drawn(0), arm, speed=0.2, **space)
     away = made.T_base_part.copy()

@@ -34,6 +34,8 @@ REPAIR = 0.2
 CLOSE = 3e-5
 """Relative cost above the lower bound up to which a motion is not refined further: a third of the
 gain below which a descent ends."""
+ON_EDGE = 1e-8
+"""rad: by how much a motion on the edge of a range, as a grid has it, may be outside: rounding."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
 
@@ -232,7 +234,8 @@ def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
     """Return the plan with gamma moved for the least interval between nodes, and what binds there.
 
     All intervals change by the same factor; the cost is not minimised. None if a node of the plan
-    is out of reach in its posture, as a node between two samples may be.
+    is out of reach in its posture, as a node between two samples may be, or if a joint or a
+    coupling stays out of its range.
     """
     for _ in range(MOST_INTERVALS):
         descent, start = _descent(plan)
@@ -244,7 +247,7 @@ def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
         plan = replace(_plan_with_motion(plan, found), time=plan.time * shorter)
         if shorter > 1 - SAME_INTERVAL:
             break
-    return plan, binding
+    return None if found.outside > ON_EDGE else (plan, binding)
 
 
 def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Binding]:
