@@ -99,7 +99,7 @@ def test_joints_that_may_be_anywhere_do_not_make_coarse_cells_worthless():
     made = plan(_arm.wave(100), arm, certify=None, **space)
     course = bound._Certification(
         made,
-        bound._steps_of(made),
+        bound.bound_steps(made),
         0.9,
         np.inf,
         bound.most_pairs(len(made.q)),

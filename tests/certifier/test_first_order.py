@@ -7,7 +7,7 @@ import pytest
 
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, plan, robot
 from kerfpath.certifier import certify
-from kerfpath.certifier.bound import _steps_of
+from kerfpath.certifier.bound import bound_steps
 from kerfpath.certifier.cells import CellMaker
 from kerfpath.certifier.first_order import FirstOrder
 from kerfpath.robots import lowest_joint
@@ -80,7 +80,7 @@ def test_no_bound_is_above_the_cheapest_motion_known(plans):
     for metric in ("manhattan", "euclid", "chebychev"):
         made = plans(metric=metric)
         maker = CellMaker(made.robot, made.frames, made.T_flange_tip, made.settings.postures)
-        steps, layers = _steps_of(made), np.array([0, 10, 20, len(made.q) - 1])
+        steps, layers = bound_steps(made), np.array([0, 10, 20, len(made.q) - 1])
         known = FirstOrder(maker, steps, len(made.q) - 1)
         known.look_about(layers, np.arange(made.robot.postures))
         straight, motion = known.cheapest(layers)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, Plan, PlanOptions, Tilt, robot
 from kerfpath.certifier import certify
-from kerfpath.certifier.bound import _steps_of
+from kerfpath.certifier.bound import bound_steps
 from kerfpath.certifier.lever_arms import _lever_arms, _turning, lever_bounds
 from kerfpath.plans import Proof
 from kerfpath.robots import Arm, Robot, RobotLimits, chain_of
@@ -106,7 +106,7 @@ def costs(made):
 def test_no_step_of_any_motion_costs_less(name, metric):
     for seed in range(8):
         made = motion(ARMS[name], seed, metric=metric)
-        least, real = lever_bounds(made, _steps_of(made)), costs(made)
+        least, real = lever_bounds(made, bound_steps(made)), costs(made)
         assert (least <= real + 1e-12).all()  # rounding of sums of numbers up to 10
         assert least.sum() > 0.05 * real.sum()
 
@@ -116,13 +116,15 @@ def test_with_a_tilt_the_axis_may_be_off_at_both_ends(name):
     asked = Tilt(cone=0.05)
     made = motion(ARMS[name], 3)
     tilted = motion(ARMS[name], 3, tilt=asked)
-    assert (lever_bounds(tilted, _steps_of(tilted)) <= lever_bounds(made, _steps_of(made))).all()
+    assert (
+        lever_bounds(tilted, bound_steps(tilted)) <= lever_bounds(made, bound_steps(made))
+    ).all()
 
 
 def test_it_is_the_least_cost_that_the_lever_arms_allow():
     """The tip alone: with one row the dual is exact, against a linear program for each step."""
     made = motion(ARMS["seven"], 1)
-    steps = _steps_of(made)
+    steps = bound_steps(made)
     chain = chain_of(made.robot)
     tool = chain.end @ made.T_flange_tip
     arms, turning = _lever_arms(made, steps, chain, tool, 0.0), _turning(chain, tool)

@@ -44,7 +44,7 @@ def potential_of(one, steps, halvings, folded=None):
 def test_no_motion_has_only_steps_below_the_potential(made, metric, folds):
     """Of motions through points drawn on the cells, with the true joints."""
     one, rng = made(metric), np.random.default_rng(5)
-    steps = minimax._capped(bound._steps_of(one), 3 * one.cost)
+    steps = minimax._capped(bound.bound_steps(one), 3 * one.cost)
     folded = np.arange(6) == 5 if folds else None
     cells, steps, found = potential_of(one, steps, 1, folded)
     t = rng.uniform(-1, 1, len(cells)) * cells.half
@@ -103,7 +103,7 @@ def test_more_work_never_lowers_the_bound(made, monkeypatch):
     one, before = made("euclid"), 0.0
     for rounds in range(1, 5):
         left = iter(range(rounds))
-        steps = bound._steps_of(one)
+        steps = bound.bound_steps(one)
         spent = lambda left=left: next(left, None) is None  # noqa: E731
         best, tried, _ = minimax.largest_step_bound(one, steps, 1e-3, spent, lambda *_: None)
         assert tried <= rounds

@@ -50,7 +50,7 @@ def every(stride, first, last):
 def course_of(one, gap=0.1):
     most = proving.most_pairs(len(one.q))
     return proving._Certification(
-        one, proving._steps_of(one), gap, np.inf, most, False, lambda *_: None
+        one, proving.bound_steps(one), gap, np.inf, most, False, lambda *_: None
     )
 
 

@@ -35,7 +35,7 @@ def short(arc, arm, tool, placement):
 
 def tubes_of(one):
     """Return the tubes of a plan, with the cells of its posture."""
-    steps = proving._steps_of(one)
+    steps = proving.bound_steps(one)
     maker = cell_maker(one, steps.weight)
     nodes = np.arange(len(one.q))
     made = Tubes(
@@ -108,7 +108,7 @@ def least_on_grid(one, width, step):
 
     The states are pairs of samples at neighbouring nodes.
     """
-    steps = proving._steps_of(one)
+    steps = proving.bound_steps(one)
     maker = cell_maker(one, steps.weight)
     nodes = np.arange(len(one.q))
     off = np.arange(-width, width + step / 2, step)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath import PlanOptions, audit, plan
 from kerfpath.certificate import BASE, cell_bounds
 from kerfpath.certifier import certify
-from kerfpath.certifier.bound import _steps_of
+from kerfpath.certifier.bound import bound_steps
 from kerfpath.certifier.cells import cell_maker
 from kerfpath.certifier.motion_slopes import motion_slopes
 from kerfpath.certifier.stages import solve_stage
@@ -129,7 +129,7 @@ def test_the_costliest_step_is_bounded_too(made, case):
 def test_no_step_costs_less_than_its_cells_say(made, case):
     """Of steps drawn at random, with the true joints: rho + V' - V is no less than zero."""
     one, rng = made(case), np.random.default_rng(3)
-    steps = _steps_of(one)
+    steps = bound_steps(one)
     maker = cell_maker(one, steps.weight)
     nodes = np.unique(np.linspace(0, len(one.q) - 1, 4).astype(int))
     own = one.gamma[nodes], maker.parameters(one.q[nodes]), one.posture[nodes].astype(int)
@@ -169,7 +169,7 @@ def test_no_step_costs_less_than_its_cells_say(made, case):
 def test_every_place_is_in_a_cell(made, case):
     """Joints at random parameters are in a cell of their posture, before and after halving."""
     one, rng = made(case), np.random.default_rng(4)
-    steps = _steps_of(one)
+    steps = bound_steps(one)
     maker = cell_maker(one, steps.weight)
     node, count = len(one.q) // 2, 200
     cells = maker.coarsest(np.array([node]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmarks.program_edits import ACCELERATION, ARM, ARMS, JOB, Subject, _draw
 
-from kerfpath.cli.plan_output import _power_entry
+from kerfpath.cli.plan_output import power_entry
 from kerfpath.execution import power_along, with_power
 from kerfpath.job import Audit, power_of, read_job, run_job
 from kerfpath.job.output.writing import report_text
@@ -85,7 +85,7 @@ def test_report_and_json_have_the_power_along_each_cut(tmp_path):
     assert page.count("<h4>Power</h4>") == len(outcome.cuts) == 2
     assert "Off the power by the speed" in page
     for cut in outcome.cuts:
-        entry = _power_entry(outcome.job, cut)
+        entry = power_entry(outcome.job, cut)
         along = power_of(outcome.job, cut)
         assert entry["power_share"] == along.set.tolist()
         assert len(entry["s_m"]) == len(entry["speed_share"]) + 1
@@ -98,7 +98,7 @@ def test_report_and_json_have_the_power_along_each_cut(tmp_path):
         assert max(speed) == pytest.approx(1.0, abs=0.01)
         assert entry["s_m"][-1] == pytest.approx(cut.plan.contour.length, rel=1e-6)
     without = replace(outcome.job, program=replace(outcome.job.program, power_by_speed=None))
-    assert _power_entry(without, outcome.cuts[0]) is None
+    assert power_entry(without, outcome.cuts[0]) is None
 
 
 @pytest.fixture(scope="module")

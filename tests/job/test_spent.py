@@ -7,7 +7,7 @@ import pytest
 from benchmarks.program_edits import _draw
 from tests.job.test_techniques import job_text
 
-from kerfpath.cli.plan_output import _cut_entry, _times_entry
+from kerfpath.cli.plan_output import cut_entry, times_entry
 from kerfpath.errors import InputError
 from kerfpath.job import prepare, read_job, run_prepared, spent_entry, spent_on, spent_on_all
 from kerfpath.job.output.writing import report_text
@@ -131,8 +131,8 @@ def test_report_table_and_json_have_each_number_with_its_unit(result):
 
 def test_the_json_of_a_contour_has_what_it_takes_beside_the_cost_of_its_plan(result):
     cut = result.cuts[1]
-    spent, entry = spent_on(result.job, cut), _cut_entry(cut)
-    times = _times_entry(result.job, cut, spent)
+    spent, entry = spent_on(result.job, cut), cut_entry(cut)
+    times = times_entry(result.job, cut, spent)
     assert not set(entry) & set(times), "one would hide the other"
     assert entry["cost"] == cut.plan.cost
     assert (times["piercing_s"], times["gas_s"]) == (spent.piercing, spent.gas_time)

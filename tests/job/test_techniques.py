@@ -10,7 +10,7 @@ from tests.job.test_power import POWER, STEPS
 
 from commands import run
 from jobs import DEMO, SMALL
-from kerfpath.cli.plan_output import _cut_entry
+from kerfpath.cli.plan_output import cut_entry
 from kerfpath.errors import InputError
 from kerfpath.execution import with_power
 from kerfpath.job import (
@@ -308,7 +308,7 @@ def test_the_technique_by_size_is_in_notes_report_json_and_passes_its_audit(tmp_
     written = write_result(result, tmp_path / "out")
     assert any("hole: cut by the technique small-hole" in note for note in written.notes)
     assert "small-hole (by size)" in (tmp_path / "out" / "report.html").read_text()
-    hole, slit = (_cut_entry(cut) for cut in result.cuts)
+    hole, slit = (cut_entry(cut) for cut in result.cuts)
     assert (hole["technique"], hole["technique_by_size"]) == ("small-hole", True)
     assert (slit["technique"], slit["technique_by_size"]) == (None, False)
     audit = Audit.of(tmp_path / "job.toml")

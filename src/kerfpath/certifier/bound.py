@@ -191,7 +191,7 @@ def certify(
     if not plan.cost > 0:
         why = "its cost is not above 0"
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
-    steps, more = _steps_of(plan), _also_for(plan)
+    steps, more = bound_steps(plan), _also_for(plan)
     checkable = checkable and not more
     if plan.robot.family.enclose_all is None:
         return _certified(plan, _lever_bound(plan, steps), gap, None, 0, 0, more)
@@ -281,7 +281,7 @@ def _also_for(plan: Plan) -> str:
     return f"{OF_BOUND}{holds}leaves out {left_out}, has no certificate"
 
 
-def _steps_of(plan: Plan) -> Steps:
+def bound_steps(plan: Plan) -> Steps:
     """Return the costs and limits of the steps of motions along the contour of a plan."""
     asked, dt = plan.settings, float(np.diff(plan.time).max())
     limits = asked.limits(plan.robot)

@@ -183,7 +183,7 @@ def finish_run(
             "not_planned": list(outcome.not_planned),
             "drawing": drawing_entry(part),
             "contours": [
-                _cut_entry(cut) | _times_entry(outcome.job, cut, spent.get(cut.name))
+                cut_entry(cut) | times_entry(outcome.job, cut, spent.get(cut.name))
                 for cut in outcome.cuts
             ],
             "process": _process_entry(outcome.job),
@@ -240,7 +240,8 @@ def _largest_tilt(cut: CutResult) -> float | None:
     return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
 
 
-def _cut_entry(cut: CutResult) -> dict[str, object]:
+def cut_entry(cut: CutResult) -> dict[str, object]:
+    """Return what the JSON output says of a cut, in SI."""
     entry: dict[str, object] = {"name": cut.name, "passed": cut.passed, "kept": bool(cut.kept)}
     entry |= {
         "length_m": cut.candidate.path.length,
@@ -281,11 +282,12 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
     }
 
 
-def _times_entry(job: Job, cut: CutResult, spent: Spent | None) -> dict[str, object]:
+def times_entry(job: Job, cut: CutResult, spent: Spent | None) -> dict[str, object]:
+    """Return what the JSON output says of the times of a cut, and of what it takes, in SI."""
     if spent is None:
         return {}
     times: dict[str, object] = {"piercing_s": spent.piercing, "gas_s": spent.gas_time}
-    return times | {"spent": spent_entry(spent), "power": _power_entry(job, cut)}
+    return times | {"spent": spent_entry(spent), "power": power_entry(job, cut)}
 
 
 def _show_spent(outcome: JobResult) -> None:
@@ -298,7 +300,8 @@ def _show_spent(outcome: JobResult) -> None:
         table(columns, [[escape(cell) for cell in row] for row in rows], numbers=columns[2:])
 
 
-def _power_entry(job: Job, cut: CutResult) -> dict[str, object] | None:
+def power_entry(job: Job, cut: CutResult) -> dict[str, object] | None:
+    """Return what the JSON output says of the power along a cut; None where it is not set."""
     along = power_of(job, cut)
     if along is None:
         return None
