@@ -30,7 +30,7 @@ HOPELESS = 1.25
 """Scores from this many times the best cost on are not refined: a refinement gains less."""
 ROUNDS = 2
 """Times that the best motions are shaken, the second only if the first gained."""
-AGAIN, SAME_END = 2, 1e-4
+AGAIN, SAME_END = 4, 1e-4
 """Refinements that end at the best cost again, to this relative difference, from which on no more
 are made: motions that are not alike lead to it."""
 SHAKEN = 2
