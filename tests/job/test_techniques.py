@@ -481,6 +481,7 @@ def test_outputs_of_gases_that_are_left_on_or_out_do_not_pass(with_gases, name):
         ('gas_2_output = "doGas2"\n', "", ["gas_2_output", "[program.rapid]"]),
         ('gas_2_output = "doGas2"', 'gas_2_output = "doGas"', ["gas_output and gas_2_output"]),
         ('gas_2 = "O2"', "gas_2 = 2", ["program.gas_2", "the gas"]),
+        ('gas_2 = "O2"', 'gas_2 = "o2"', ["program.gas_2", "expected a gas of the rows in use"]),
     ],
 )
 def test_gases_without_an_output_of_their_own_are_refused(tmp_path, old, new, words):

@@ -264,6 +264,11 @@ def _alike(path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]) -
     program = source.get("program", {})
     if not isinstance(program, dict):
         return program
+    second, gases = program.get("gas_2"), {_gas(source, row): None for row in rows}
+    if second is not None and len(gases) > 1 and second not in gases:
+        named = ", ".join(gas for gas in gases if gas)
+        said = f"expected a gas of the rows in use, {named}, got {second!r}; the others would all "
+        raise refusal_at(path, ("program", "gas_2"), f"{said}be switched by gas_output")
     each, found, full = [*_by_program(source, rows).values()], {}, full_power(source, rows)
     for key in dict.fromkeys(key for values in each for key in values):
         values = [one.get(key) for one in each]
@@ -282,6 +287,11 @@ def _alike(path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]) -
         said += f"none in {lacks}; add it there, or write power_by_speed in [program]"
         raise refusal_at(path, ("process", "technique"), said)
     return {**program, **found}
+
+
+def _gas(source: Mapping[str, Any], row: RowTable) -> str | None:
+    """Return the gas of a row, or else that of the job; None if neither says it."""
+    return row.gas or source["process"].get("gas")
 
 
 def full_power(source: Mapping[str, Any], rows: Sequence[RowTable]) -> float | None:
@@ -323,7 +333,7 @@ def _by_program(
             values["pierce_time_s"] = row.pierce_time
         if gases and "gas_lead_s" not in program:
             values |= {} if row.gas_lead_s is None else {"gas_lead_s": row.gas_lead_s}
-        if second is not None and (row.gas or source["process"].get("gas")) == second:
+        if second is not None and _gas(source, row) == second:
             values["gas"] = "gas_2"
         if powered and curves and CURVE not in program:
             curve = row.power_by_speed or [[0.0, 1.0], [1.0, 1.0]]
