@@ -265,7 +265,7 @@ def _alike(path: Path, source: Mapping[str, Any], rows: Sequence[JobRowTable]) -
     if not isinstance(program, dict):
         return program
     second, gases = program.get("gas_2"), {_gas(source, row): None for row in rows}
-    if second is not None and len(gases) > 1 and second not in gases:
+    if isinstance(second, str) and len(gases) > 1 and second not in gases:
         named = ", ".join(gas for gas in gases if gas)
         said = f"expected a gas of the rows in use, {named}, got {second!r}; the others would all "
         raise refusal_at(path, ("program", "gas_2"), f"{said}be switched by gas_output")
