@@ -184,6 +184,7 @@ def test_the_example_of_a_whole_part_runs(capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("explored")
 def test_no_path_shows_every_way_out(capsys):
     no_path.main()
     said = capsys.readouterr().out
