@@ -16,7 +16,6 @@ the change that (6) allows.
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -26,7 +25,7 @@ from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.elimination import Elimination
 from kerfpath.certifier.stages import Steps, distinct_groups
-from kerfpath.certifier.tubes import DEEPEST, TANGENTS, Tube, hull
+from kerfpath.certifier.tubes import DEEPEST, Tube, TubeRows, hull
 from kerfpath.conic import NonnegativeConeT, minimise
 
 ACROSS = 24
@@ -46,57 +45,34 @@ class _Excess:
     """The program of the least share by which the motions of a tube exceed (5) and (6)."""
 
     def __init__(self, steps: Steps, nodes: Ints) -> None:
-        self._steps, self.spans = steps, np.diff(nodes)
-        M, n = len(nodes), len(steps.velocity)
-        size = (M - 1) * n
-        self._size, self._count = (M, n), 2 * M + size + 1
-        eye = sparse.eye_array(self._count, format="csr")
-        t, w, u, over = eye[:M], eye[M : 2 * M], eye[2 * M : 2 * M + size], eye[-1:]
-        self._link = u
-        each = np.repeat(self.spans.astype(float), n)
-        mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ u)
-        bent, apart = mean[n:] - mean[:-n], (self.spans[:-1] + self.spans[1:]) / 2
-        change = np.outer(apart, steps.acceleration).ravel()
-        velocity = np.concatenate([steps.over(int(m)).velocity for m in self.spans])
+        self._steps, self._of = steps, TubeRows(steps, nodes, 1)
+        over = self._of.own
+        (bent, change), (u, velocity) = self._of.bend, self._of.move
         faster, sharper = (sparse.csr_array(a[:, None]) @ over for a in (velocity, change))
-        one, zero = np.ones(M), np.zeros(M)
-        rows: list[Any] = [bent - sharper, -bent - sharper, u - faster, -u - faster]
-        rows += [t, -t, w, -w, -over]
-        right = [change, change, velocity, velocity, one, one, one, zero, np.zeros(1)]
-        for at in TANGENTS:
-            rows.append(2 * at * t - w)
-            right.append(at * at * one)
+        pairs = [(bent - sharper, change), (-bent - sharper, change)]
+        pairs += [(u - faster, velocity), (-u - faster, velocity)]
+        pairs += [*self._of.box, (-over, np.zeros(1)), *self._of.tangents]
+        rows, right = zip(*pairs, strict=True)
         self._rows, self._right = sparse.csr_array(sparse.vstack(rows)), np.concatenate(right)
-        k, i = np.divmod(np.arange(size), n)
-        self._place = np.tile(np.arange(size), 4), np.concatenate([k + 1, k, M + k + 1, M + k])
-        self._at = k, i
+        self.spans = self._of.spans
 
     def solve(self, tube: Tube) -> tuple[Array, Array, Array] | None:
         """Return duals y (M - 1, n) and nu (M, n), and how far each layer is from the parabola.
 
         The last are (M,), as shares of (6). None if the solver fails.
         """
-        M, n = self._size
-        k, i = self._at
-        linear, square = tube.slope * tube.half[:, None], tube.bend * tube.half[:, None] ** 2 / 2
-        values = [linear[k + 1, i], -linear[k, i], square[k + 1, i], -square[k, i]]
-        size = len(k)
-        moved = sparse.csr_array((np.concatenate(values), self._place), (size, self._count))
-        link = moved - self._link
-        D, wide = np.diff(tube.center, axis=0).ravel(), (tube.spread[1:] + tube.spread[:-1]).ravel()
+        link, wide = self._of.of(tube)
+        square = tube.bend * tube.half[:, None] ** 2 / 2
         worth = np.abs(2 * square / self._steps.acceleration).max(axis=1)
-        cost = np.concatenate([np.zeros(M), NEARER * worth / worth.sum(), np.zeros(size), [1.0]])
-        rows = sparse.vstack([link, -link, self._rows])
-        bounds = np.concatenate([wide - D, wide + D, self._right])
+        zero = np.zeros(len(worth)), np.zeros(self._of.size)
+        cost = np.concatenate([zero[0], NEARER * worth / worth.sum(), zero[1], [1.0]])
+        bounds = np.concatenate([wide, self._right])
         cones = [NonnegativeConeT(len(bounds))]
-        found = minimise(cost, rows, bounds, cones, threads=1)
+        found = minimise(cost, sparse.vstack([link, self._rows]), bounds, cones, threads=1)
         if not (np.isfinite(found.dual).all() and np.isfinite(found.x).all()):
             return None
-        y = (found.dual[:size] - found.dual[size : 2 * size]).reshape(M - 1, n)
-        above = found.dual[2 * size :][: 2 * (size - n)].reshape(2, M - 2, n)
-        nu = np.pad(above[0] - above[1], ((1, 1), (0, 0)))
-        t, w = found.x[:M], found.x[M : 2 * M]
-        return y, nu, np.maximum(w - t * t, 0.0) * worth
+        _, beyond = self._of.beyond(found.x)
+        return *self._of.duals(found.dual), beyond * worth
 
 
 class EmptyTubes:

@@ -126,77 +126,108 @@ class _Found:
     __repr__ = short_repr
 
 
-class _Program:
-    """The convex program of tubes at given layers."""
+class TubeRows:
+    """What programs of tubes at given layers share: their variables, and the rows of a tube.
 
-    def __init__(self, steps: Steps, nodes: Ints) -> None:
-        self._steps, self.spans = steps, np.diff(nodes)
-        M, n = len(nodes), len(steps.weight)
-        edges, size = M - 1, (M - 1) * n
-        manhattan = steps.metric == MANHATTAN
-        lengths = size if manhattan else edges
-        first = 2 * M + size
-        self._size, self._count = (M, n), first + lengths
-        eye = sparse.eye_array(self._count, format="csr")
-        t, w, u, r = eye[:M], eye[M : 2 * M], eye[2 * M : first], eye[first:]
-        self._link = u
+    The variables are gamma in half-widths (M,), its squares (M,), the increments of the joints
+    (M - 1, n) in a row, and `more` of the program's own; `gamma`, `square`, `step` and `own` are
+    the rows of the identity that pick them. Rows come in pairs of a matrix and its largest values.
+    """
+
+    def __init__(self, steps: Steps, nodes: Ints, more: int) -> None:
+        self.spans = np.diff(nodes)
+        M, n = len(nodes), len(steps.velocity)
+        size = (M - 1) * n
+        self.shape, self.size, self.count = (M, n), size, 2 * M + size + more
+        eye = sparse.eye_array(self.count, format="csr")
+        self.gamma, self.square = eye[:M], eye[M : 2 * M]
+        self.step, self.own = eye[2 * M : 2 * M + size], eye[2 * M + size :]
         each = np.repeat(self.spans.astype(float), n)
-        mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ u)
-        bent, apart = mean[n:] - mean[:-n], (self.spans[:-1] + self.spans[1:]) / 2
-        change = np.outer(apart, steps.acceleration).ravel()
-        velocity = np.concatenate([steps.over(int(m)).velocity for m in self.spans])
-        moved = sparse.diags_array(np.tile(steps.weight, edges)) @ u
+        mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ self.step)
+        apart = (self.spans[:-1] + self.spans[1:]) / 2
+        self.bend = mean[n:] - mean[:-n], np.outer(apart, steps.acceleration).ravel()
+        velocity = [steps.over(int(m)).velocity for m in self.spans]
+        self.move = self.step, np.concatenate(velocity)
         one, zero = np.ones(M), np.zeros(M)
-        rows: list[Any] = [bent, -bent, u, -u, t, -t, w, -w]
-        right = [change, change, velocity, velocity, one, one, one, zero]
-        for at in TANGENTS:
-            rows.append(2 * at * t - w)
-            right.append(at * at * one)
-        if manhattan:
-            rows += [moved - r, -moved - r]
-            right += [np.zeros(size)] * 2
-        held = sum(len(bound) for bound in right)
-        self._cones = [NonnegativeConeT(2 * size + held)]
-        if not manhattan:
-            longer, bound, cones = Lengths(moved, np.zeros(size), n, steps.metric).cones(
-                first, self._count
-            )
-            rows.append(longer)
-            right.append(bound)
-            self._cones += cones
-        self._rows = sparse.csr_array(sparse.vstack(rows))
-        self._right = np.concatenate(right)
-        self._cost = np.concatenate([np.zeros(first), np.ones(lengths)])
+        t, w = self.gamma, self.square
+        self.box: list[tuple[Any, Array]] = [(t, one), (-t, one), (w, one), (-w, zero)]
+        self.tangents = [(2 * at * t - w, at * at * one) for at in TANGENTS]
         k, i = np.divmod(np.arange(size), n)
         self._place = np.tile(np.arange(size), 4), np.concatenate([k + 1, k, M + k + 1, M + k])
         self._at = k, i
 
-    def solve(self, tube: Tube) -> _Found | None:
-        """Return what the program of a tube finds; None if the solver fails."""
-        M, n = self._size
+    def of(self, tube: Tube) -> tuple[Any, Array]:
+        """Return the rows by which the increments are those of a tube, within its spread."""
         k, i = self._at
         linear, square = tube.slope * tube.half[:, None], tube.bend * tube.half[:, None] ** 2 / 2
         values = [linear[k + 1, i], -linear[k, i], square[k + 1, i], -square[k, i]]
-        size = len(k)
-        moved = sparse.csr_array((np.concatenate(values), self._place), (size, self._count))
-        link = moved - self._link
+        moved = sparse.csr_array((np.concatenate(values), self._place), (self.size, self.count))
+        link = moved - self.step
         D, wide = np.diff(tube.center, axis=0).ravel(), (tube.spread[1:] + tube.spread[:-1]).ravel()
-        rows = sparse.vstack([link, -link, self._rows])
-        bounds = np.concatenate([wide - D, wide + D, self._right])
-        found: ConicSolution = minimise(self._cost, rows, bounds, self._cones, threads=1)
+        return sparse.vstack([link, -link]), np.concatenate([wide - D, wide + D])
+
+    def duals(self, found: Array) -> tuple[Array, Array]:
+        """Return the duals y (M - 1, n) of the increments and nu (M, n) of (6).
+
+        The rows of the program begin with those of a tube and of `bend`, both ways.
+        """
+        (M, n), size = self.shape, self.size
+        y = (found[:size] - found[size : 2 * size]).reshape(M - 1, n)
+        above = found[2 * size :][: 2 * (size - n)].reshape(2, M - 2, n)
+        return y, np.pad(above[0] - above[1], ((1, 1), (0, 0)))
+
+    def beyond(self, x: Array) -> tuple[Array, Array]:
+        """Return gamma in half-widths (M,), and its squares less the square of it (M,)."""
+        M, _ = self.shape
+        t, w = x[:M], x[M : 2 * M]
+        return t, np.maximum(w - t * t, 0.0)
+
+
+class _Program:
+    """The convex program of tubes at given layers."""
+
+    def __init__(self, steps: Steps, nodes: Ints) -> None:
+        M, n = len(nodes), len(steps.weight)
+        edges, size = M - 1, (M - 1) * n
+        manhattan = steps.metric == MANHATTAN
+        lengths = size if manhattan else edges
+        self._of = one = TubeRows(steps, nodes, lengths)
+        self.spans, first = one.spans, one.count - lengths
+        moved = sparse.diags_array(np.tile(steps.weight, edges)) @ one.step
+        (bent, change), (u, velocity) = one.bend, one.move
+        pairs = [(bent, change), (-bent, change), (u, velocity), (-u, velocity)]
+        pairs += [*one.box, *one.tangents]
+        if manhattan:
+            pairs += [(moved - one.own, np.zeros(size)), (-moved - one.own, np.zeros(size))]
+        held = sum(len(bound) for _, bound in pairs)
+        self._cones = [NonnegativeConeT(2 * size + held)]
+        if not manhattan:
+            longer, bound, cones = Lengths(moved, np.zeros(size), n, steps.metric).cones(
+                first, one.count
+            )
+            pairs.append((longer, bound))
+            self._cones += cones
+        rows, right = zip(*pairs, strict=True)
+        self._rows, self._right = sparse.csr_array(sparse.vstack(rows)), np.concatenate(right)
+        self._cost = np.concatenate([np.zeros(first), np.ones(lengths)])
+
+    def solve(self, tube: Tube) -> _Found | None:
+        """Return what the program of a tube finds; None if the solver fails."""
+        link, wide = self._of.of(tube)
+        found: ConicSolution = minimise(
+            self._cost, sparse.vstack([link, self._rows]), np.concatenate([wide, self._right]),
+            self._cones, threads=1,
+        )  # fmt: skip
         if not np.isfinite(found.dual).all():
             return None
-        duals = found.dual
-        y = (duals[:size] - duals[size : 2 * size]).reshape(M - 1, n)
-        above = duals[2 * size :][: 2 * (size - n)].reshape(2, M - 2, n)
-        nu = np.pad(above[0] - above[1], ((1, 1), (0, 0)))
-        t, w = found.x[:M], found.x[M : 2 * M]
+        y, nu = self._of.duals(found.dual)
+        t, beyond = self._of.beyond(found.x)
         return _Found(
             solved=found.solved and bool(np.isfinite(t).all()),
             y=y,
             nu=nu,
             gamma=tube.middle + tube.half * np.clip(t, -1.0, 1.0),
-            beyond=np.maximum(w - t * t, 0.0) * tube.half**2,
+            beyond=beyond * tube.half**2,
         )
 
 
