@@ -43,8 +43,8 @@ from kerfpath.job import (
     require_place,
     run_prepared,
     sequence_entry,
+    spent_by_contour,
     spent_entry,
-    spent_on,
     spent_on_all,
     spent_table,
     with_map,
@@ -175,8 +175,7 @@ def finish_run(
     """
     with busy("writing"):
         written = write_result(outcome, folder, strict=strict)
-    planned = (cut for cut in outcome.cuts if cut.plan is not None)
-    spent = {cut.name: spent_on(outcome.job, cut) for cut in planned}
+    spent = spent_by_contour(outcome)
     print_json(
         {
             "passed": outcome.passed,
@@ -197,7 +196,7 @@ def finish_run(
         }
     )
     _show_cuts(outcome.cuts)
-    _show_spent(outcome)
+    _show_spent(outcome, spent)
     names = [cut.name for cut in outcome.cuts]
     names += identifiers(names, ())  # as in programs
     warnings: list[str] = []
@@ -290,13 +289,10 @@ def times_entry(job: Job, cut: CutResult, spent: Spent | None) -> dict[str, obje
     return times | {"spent": spent_entry(spent), "power": power_entry(job, cut)}
 
 
-def _show_spent(outcome: JobResult) -> None:
-    heads, rows = spent_table(outcome)
+def _show_spent(outcome: JobResult, spent: Mapping[str, Spent]) -> None:
+    heads, rows = spent_table(outcome, spent)
     if rows:
-        columns = [f"{name} {unit}".strip().lower() for name, unit in heads]
-        columns = [
-            name.replace(unit.lower(), unit) for name, (_, unit) in zip(columns, heads, strict=True)
-        ]
+        columns = [f"{name.lower()} {unit}".strip() for name, unit in heads]
         table(columns, [[escape(cell) for cell in row] for row in rows], numbers=columns[2:])
 
 

@@ -68,6 +68,7 @@ from kerfpath.job.output import require_language as require_language
 from kerfpath.job.output import require_place as require_place
 from kerfpath.job.output import result_texts as result_texts
 from kerfpath.job.output import script_refusal as script_refusal
+from kerfpath.job.output import spent_by_contour as spent_by_contour
 from kerfpath.job.output import spent_entry as spent_entry
 from kerfpath.job.output import spent_on as spent_on
 from kerfpath.job.output import spent_on_all as spent_on_all

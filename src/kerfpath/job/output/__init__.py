@@ -4,6 +4,7 @@ from kerfpath.job.output.script import python_script as python_script
 from kerfpath.job.output.script import script_refusal as script_refusal
 from kerfpath.job.output.spent import Spent as Spent
 from kerfpath.job.output.spent import power_of as power_of
+from kerfpath.job.output.spent import spent_by_contour as spent_by_contour
 from kerfpath.job.output.spent import spent_entry as spent_entry
 from kerfpath.job.output.spent import spent_on as spent_on
 from kerfpath.job.output.spent import spent_on_all as spent_on_all

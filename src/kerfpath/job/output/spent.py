@@ -8,7 +8,7 @@ pierce, times the duty, with none along micro joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,12 @@ def spent_on(job: Job, cut: CutResult) -> Spent:
         energy=energy,
         cost=_cost(job.cost, row, took + pierced, gas, energy),
     )
+
+
+def spent_by_contour(outcome: JobResult) -> dict[str, Spent]:
+    """Return what each planned contour takes, by its name."""
+    planned = (cut for cut in outcome.cuts if cut.plan is not None)
+    return {cut.name: spent_on(outcome.job, cut) for cut in planned}
 
 
 def spent_on_all(outcome: JobResult, each: Sequence[Spent]) -> Spent:
@@ -212,16 +218,20 @@ def _sum(values: Iterable[float | None]) -> float | None:
 # The table of the report and of the command line.
 
 
-def spent_table(outcome: JobResult) -> tuple[list[tuple[str, str]], list[list[str]]]:
+def spent_table(
+    outcome: JobResult, by_contour: Mapping[str, Spent] | None = None
+) -> tuple[list[tuple[str, str]], list[list[str]]]:
     """Return names and units of columns, and a row for each contour and for all together.
 
-    Only jobs with [process] or [cost] have rows, and only columns with values.
+    Only jobs with [process] or [cost] have rows, and only columns with values. What each contour
+    takes is computed where it is not given.
     """
     job = outcome.job
     if "process" not in job.source and job.cost is None:
         return [], []
+    by_contour = spent_by_contour(outcome) if by_contour is None else by_contour
     cuts = [cut for cut in outcome.cuts if cut.plan is not None]
-    each = [spent_on(job, cut) for cut in cuts]
+    each = [*by_contour.values()]
     spent = [*each, spent_on_all(outcome, each)]
     currency = "" if job.cost is None else job.cost.currency
     columns: list[tuple[str, str, list[float | None], int]] = [
