@@ -11,8 +11,8 @@ import kerfpath
 from kerfpath import Contour, NoFeasiblePath, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import box_between, cell_of
+from kerfpath.planner.turned import ALIKE, turned
 from kerfpath.sequence import PartPlan, plan_part
-from kerfpath.sequence.turned import ALIKE, turned
 
 STEP, SPEED = np.radians(15), 0.05
 X, Y, Z = np.eye(3)

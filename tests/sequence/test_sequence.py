@@ -26,8 +26,8 @@ from kerfpath.sequence import (
     order_plans,
     plan_part,
 )
-from kerfpath.sequence.part import MANY, WORTH, on_near_turns
-from kerfpath.transfer import back_off, least_time, transfer_move
+from kerfpath.sequence.part import MANY, WORTH
+from kerfpath.transfer import back_off, least_time, on_near_turns, transfer_move
 from programs import read_text, text_of
 
 STEP = np.radians(10)

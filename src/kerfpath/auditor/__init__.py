@@ -23,6 +23,7 @@ from kerfpath.auditor.table import Level as Level
 from kerfpath.auditor.table import Unit as Unit
 from kerfpath.auditor.table import format_value as format_value
 from kerfpath.auditor.table import worst_of as worst_of
+from kerfpath.auditor.transfer import approach_checks as approach_checks
 from kerfpath.auditor.transfer import retract_checks as retract_checks
 from kerfpath.auditor.transfer import transfer_checks as transfer_checks
 

@@ -19,7 +19,7 @@ from kerfpath.auditor.margins import margins
 from kerfpath.auditor.motion import Motion, joint_increments, motion_of
 from kerfpath.auditor.rounding import MOST_ROUNDED, Rounding
 from kerfpath.auditor.table import Check, Issues, check_worst
-from kerfpath.auditor.transfer import retract_checks
+from kerfpath.auditor.transfer import approach_checks, retract_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -339,6 +339,7 @@ def checks(
         *rate_checks(plan, reached, rounding),
         *margins(plan, chain, rounding),
         *retract_checks(plan, plan.settings.retract),
+        *approach_checks(plan, cell),
         *([] if cell is None else collisions(cell, motion, chain)),
         *bound_checks(plan),
     ]

@@ -15,7 +15,7 @@ from kerfpath.auditor.collision import collision_along
 from kerfpath.auditor.motion import follow
 from kerfpath.auditor.table import Check, check_worst
 from kerfpath.cell import Cell
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.robots import Robot, require_axes
 
 # -----------------------------------------------------------------------------
@@ -175,3 +175,75 @@ def _sample_motions(corners: Array) -> tuple[Array, Ints]:
         samples.append(one + np.linspace(0, 1, count + 1)[:, None] * (two - one))
         legs.append(np.full(count + 1, k))
     return np.vstack(samples), np.concatenate(legs)
+
+
+# -----------------------------------------------------------------------------
+# The checks of a plan's own moves: from where the robot stands, and to where it goes.
+
+SAME_PLACE = 1e-6
+"""rad, or m: rounding by which the end of a move may differ from the end of the cut."""
+
+
+def approach_checks(plan: Plan, cell: Cell | None = None) -> list[Check]:
+    """Return the checks of the approach and the retreat of a plan, none where it has neither.
+
+    They are those of `transfer_checks`, and that each meets the cut, or where the tool has backed
+    off from it by `settings.retract`; the way there, too, is clear. The node of a check is a
+    corner.
+    """
+    rows: list[Check] = []
+    for name, move, node in (("approach", plan.approach, 0), ("retreat", plan.retreat, -1)):
+        if move is not None:
+            own = _own_checks(plan, move, node, cell)
+            rows += [
+                replace(
+                    row,
+                    code=f"{name}-{row.code.removeprefix('air-')}",
+                    title=f"{name}: {row.title}",
+                )
+                for row in own
+            ]
+    return rows
+
+
+def _own_checks(plan: Plan, move: TransferMove, node: int, cell: Cell | None) -> list[Check]:
+    s, robot = plan.settings, plan.robot
+    chain = chain_of(robot)
+    way, missed = _backed_off(plan, chain, node)
+    meeting = 0 if node else -1
+    off = np.abs(move.q[meeting] - way[-1])
+    whole = 2 * np.pi * np.round(off / (2 * np.pi))
+    off = np.where(robot.endless, np.abs(off - whole), off)
+    at = meeting % len(move.q)
+    rows = [
+        *transfer_checks(robot, move.q, move.time, cell=cell, eta_v=s.eta_v, eta_a=s.eta_a),
+        Check(
+            code="air-ends", title="distance of the move from the cut", node=at, unit="rad",
+            value=float(off.max()) if missed <= MISSED else OUT_OF_REACH, limit=SAME_PLACE,
+        ),
+        Check(
+            code="air-begins", title="time at the start of the move", node=0, unit="s",
+            value=abs(float(move.time[0])), limit=1e-9,
+        ),
+    ]  # fmt: skip
+    if cell is not None and len(way) > 1 and len(cell.pairs):
+        steps = np.full(len(way) - 1, at)
+        found = collision_along(cell, way[:-1], way[1:], steps, chain)
+        rows += [replace(row, code=f"straight-{row.code}") for row in found]
+    return rows
+
+
+def _backed_off(plan: Plan, chain: JointChain, node: int) -> tuple[Array, float]:
+    """Return joints (m, n) from a node to where the tool has backed off, and the largest miss."""
+    q = plan.q[node][None]
+    way, worst = [q], 0.0
+    if plan.settings.retract:
+        chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
+        start = chain.forward(q)
+        for part in np.arange(1, PARTS + 1) / PARTS:
+            T = start.copy()
+            T[:, :3, 3] -= part * plan.settings.retract * T[:, :3, 2]
+            q, missed = follow(chain, T, q)
+            worst = max(worst, float(missed[0]))
+            way.append(q)
+    return np.vstack(way), worst

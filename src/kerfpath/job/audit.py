@@ -191,11 +191,13 @@ def check_moves(
     limits, not faster than the robot can, and free of collisions, as must approach and retract.
     """
     sequence, robot = expected.job.sequence, expected.job.robot
+    own = sum(m is not None for p in plans for m in (p.approach, p.retreat))
     if sequence is None:
-        return [count("moves", "moves that the job does not ask for", len(moves))] if moves else []
+        surplus = len(moves) + own
+        return [count("moves", "moves that the job does not ask for", surplus)] if surplus else []
     homes = 2 if expected.job.home is not None else 0
     wanted = len(plans) - 1 + homes
-    rows = [count("moves", "missing or surplus moves", abs(len(moves) - wanted))]
+    rows = [count("moves", "missing or surplus moves", abs(len(moves) - wanted) + own)]
     odd = [m for m in moves if m.q.shape[1] != robot.joints or len(m.q) < 2]
     far = [m for m in moves if not np.abs(m.q).max(initial=0.0) < FARTHEST]
     rows.append(count("corners", "moves without two corners of the robot's joints", len(odd)))

@@ -266,6 +266,8 @@ class PlanData(TypedDict):
     bound: float | None
     gap: float | None
     certificate: NotRequired[CertificateData]
+    approach: NotRequired[MoveData]
+    retreat: NotRequired[MoveData]
     criteria: CriteriaData
     feed: FeedData | None
     counts: dict[str, int]
@@ -772,14 +774,13 @@ def sequence_entry(part: PartPlan) -> SequenceData:
         "air_s": part.air_time,
         "piercing_s": part.piercing_time,
         "retract_m": part.retract,
-        "moves": [
-            cast(
-                MoveData,
-                {"clear": move.clear, "time_s": move.time.tolist(), **apart("q", move.q, robot)},
-            )
-            for move in part.moves
-        ],
+        "moves": [_move_entry(move, robot) for move in part.moves],
     }
+
+
+def _move_entry(move: TransferMove, robot: Robot) -> MoveData:
+    entry = {"clear": move.clear, "time_s": move.time.tolist(), **apart("q", move.q, robot)}
+    return cast(MoveData, entry)
 
 
 def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, ...]:
@@ -790,15 +791,14 @@ def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, 
     InputError
         Joints and times do not fit together, or external axes are missing.
     """
-    if entry is None:
-        return ()
-    return tuple(
-        TransferMove(
-            q=floats(joints(move, "q", robot), "corners of a move", (None, None)),
-            time=floats(move["time_s"], "time_s of a move", (len(move["q_rad"]),)),
-            clear=bool(move["clear"]),
-        )
-        for move in entry["moves"]
+    return () if entry is None else tuple(_read_move(move, robot) for move in entry["moves"])
+
+
+def _read_move(move: MoveData, robot: Robot) -> TransferMove:
+    return TransferMove(
+        q=floats(joints(move, "q", robot), "corners of a move", (None, None)),
+        time=floats(move["time_s"], "time_s of a move", (len(move["q_rad"]),)),
+        clear=bool(move["clear"]),
     )
 
 
@@ -953,6 +953,7 @@ def _read_robot(robot: RobotData, limits: LimitsData) -> Robot:
 def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:
     nodes: Mapping[str, Any] = entry["nodes"]
     certificate = entry.get("certificate")
+    approach, retreat = entry.get("approach"), entry.get("retreat")
     weights = {"weights_per_rad": joints(entry, "weights_per", robot).tolist()}
     return Plan(
         contour=Contour(
@@ -986,6 +987,8 @@ def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan
         ),
         counts=entry["counts"],
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
+        approach=None if approach is None else _read_move(approach, robot),
+        retreat=None if retreat is None else _read_move(retreat, robot),
     )
 
 
@@ -1076,6 +1079,8 @@ def plan_entry(
         "bound": proof.bound,
         "gap": proof.gap,
         **({} if shown is None else {"certificate": certificate_entry(shown)}),
+        **({} if plan.approach is None else {"approach": _move_entry(plan.approach, plan.robot)}),
+        **({} if plan.retreat is None else {"retreat": _move_entry(plan.retreat, plan.robot)}),
         "criteria": {
             **apart("displacement", criteria.displacement, plan.robot),
             **apart("largest_increment", criteria.largest_increment, plan.robot),

@@ -24,3 +24,4 @@ from kerfpath.planner.statements import FINER as FINER
 from kerfpath.planner.statements import ON_THIS_GRID as ON_THIS_GRID
 from kerfpath.planner.statements import at_least as at_least
 from kerfpath.planner.statements import at_most as at_most
+from kerfpath.planner.turned import turned as turned

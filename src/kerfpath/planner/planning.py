@@ -32,6 +32,7 @@ from kerfpath.planner.continuous import (
     grid_reason,
     refined_course,
 )
+from kerfpath.planner.ends import Ends
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
 from kerfpath.planner.folding import all_within_ranges, unfolded, within_ranges
 from kerfpath.planner.on_grid import ON_GRID
@@ -225,11 +226,13 @@ def plan(
     cell: Cell | None = None,
     graph: LayeredGraph | None = None,
     external: ArrayLike | None = None,
+    start_q: ArrayLike | None = None,
+    end_q: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
     phase: Callable[[str], None] | None = None,
     **keywords: Unpack[PlanKeywords],
 ) -> Plan:
-    """Return the best joint motion along the contour.
+    """Return the best joint motion along the contour, and the moves to it and from it.
 
     Parameters
     ----------
@@ -290,27 +293,35 @@ def plan(
         Values of the robot's external axes at every node, from which they are refined; for a
         seven-axis arm, those of joint 3 come first. Default: the method "continuous" looks for a
         smooth course, the others search a grid in the steps of these joints.
+    start_q, end_q : (n,) rad, optional
+        Where the robot stands before the cut, and where it goes after it: `Plan.approach` and
+        `Plan.retreat` are the moves there, straight or around what is in the way of a cell. Of the
+        motions that cost nearly the same, by turns of joints, rotation about the beam or posture,
+        it is the one with the shortest moves; where none can be reached, the cheapest motion in
+        another posture that can be.
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call. With very
         many nodes some are solved first, and all only if these do not lead to a plan.
     phase : callable, optional
         Called with each phase that begins once the poses are solved: "search", "refinement",
-        "certificate".
+        "moves", "certificate".
 
     Raises
     ------
     NoFeasiblePath
         There is no path; the message names the first node where it breaks, and counts what each
-        test removed there.
+        test removed there. Or there is no way from `start_q` or to `end_q`, or the robot is not
+        clear there (proved).
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range, or `between_nodes`
-        "guaranteed".
+        Limits that are not known, nodes unevenly spaced, values out of range, `start_q` or `end_q`
+        beyond the joint limits, or `between_nodes` "guaranteed".
     """
     asked = with_keywords(options, keywords, PlanKeywords)
     require_nodes_alone(asked, "plan")
     if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
         raise InputError("comfort clearance: is measured in a cell; give cell=")
     setup = Setup.of(robot, tool, placement, cell)
+    ends = Ends.of(setup, start_q, end_q)
     attempt: Attempt | None = None
 
     def planned(unfold: Bools) -> Plan:
@@ -333,6 +344,60 @@ def plan(
     except NoFeasiblePath as broken:
         raise add_window_note(broken, asked) from None
     assert attempt is not None, "the plan is of an attempt"
+    if not ends.given:
+        return _bounded(made, attempt, asked, robot, phase)
+
+    def in_posture(posture: int) -> Plan:
+        alone = replace(asked, postures=(posture,), certify=None)
+        return plan(contour, robot, tool=tool, placement=placement, speed=speed, options=alone,
+                    cell=cell, external=external)  # fmt: skip
+
+    (phase or unheard)("moves")
+    made = _joined(made, ends, in_posture)
+    found = _bounded(made, attempt, asked, robot, phase)
+    if found.approach is not None or found.retreat is not None:
+        return found
+    try:  # the search for a bound came upon a better motion
+        return ends.joined([found])
+    except NoFeasiblePath:
+        return with_bound(made, asked.certify, phase=phase)
+
+
+def _joined(made: Plan, ends: Ends, in_posture: Callable[[int], Plan]) -> Plan:
+    """Return a plan, or one alike, with its moves; else the cheapest in another posture.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is no way from where the robot stands, or to where it goes.
+    """
+    try:
+        return ends.joined(ends.alike(made))
+    except NoFeasiblePath as broken:
+        stuck = broken
+    every, asked = made.settings.postures, made.settings
+    others = []
+    for posture in range(made.robot.postures) if every is None else every:
+        if posture != made.posture[0] or np.ptp(made.posture):
+            with suppress(NoFeasiblePath):
+                others.append(replace(in_posture(posture), settings=asked))
+    for other in sorted(others, key=lambda one: one.cost):
+        with suppress(NoFeasiblePath):
+            found = ends.joined([other])
+            said = found.proof.also("no way was found to the best motion, in another posture")
+            return replace(found, proof=said)
+    tried = f"; also tried: {len(others)} other postures" if others else ""
+    raise stuck.with_message(f"{stuck}{tried}")
+
+
+def _bounded(
+    made: Plan,
+    attempt: Attempt,
+    asked: PlanOptions,
+    robot: Robot,
+    phase: Callable[[str], None] | None,
+) -> Plan:
+    """Return a plan with the bound that is asked for, or the better motion that it leads to."""
     made = with_bound(
         made, asked.certify, phase=phase, refined=partial(_refined, attempt=attempt, robot=robot)
     )

@@ -311,6 +311,36 @@ def path_cost(
 
 
 # -----------------------------------------------------------------------------
+# A move through the air, to a cut or from it.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TransferMove:
+    """Straight joint motions from corner to corner, with a stop at each.
+
+    Parameters
+    ----------
+    q : (m, n) rad
+        Corners, including both ends.
+    time : (m,) s
+        Time at which each corner is reached, from 0.
+    clear : bool
+        Whether the move is proved clear in a cell; False where no cell was given.
+    """
+
+    q: Array
+    time: Array
+    clear: bool
+
+    __repr__ = short_repr
+
+    @property
+    def duration(self) -> float:
+        """Duration of the move (s)."""
+        return float(self.time[-1])
+
+
+# -----------------------------------------------------------------------------
 # Plan: the motion of the robot at every node.
 
 if TYPE_CHECKING:
@@ -348,6 +378,10 @@ class Plan:
     proof : Proof
     feed : Feed or None
         Feed reduction; None at constant speed.
+    approach, retreat : TransferMove, optional
+        The move from where the robot stands to the first node, and from the last node to where it
+        goes, with stops at the nodes; with `settings.retract`, to and from where the tool has
+        backed off by it. None: not planned.
     counts : mapping of str to int
         Number of candidates (node, tilt, gamma, posture) of the searched layered graph, by reason.
         With very many nodes the graph may have only some of them.
@@ -368,6 +402,8 @@ class Plan:
     counts: Mapping[str, int]
     feed: Feed | None = None
     tilt: Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    approach: TransferMove | None = None
+    retreat: TransferMove | None = None
 
     def __repr__(self) -> str:
         best = ", best of its grid" if self.proof.optimal else ""
@@ -393,6 +429,12 @@ class Plan:
         }
         if (np.diff(cast["time"]) <= 0).any():
             raise InputError("time: must increase from node to node")
+        for name in ("approach", "retreat"):
+            move: TransferMove | None = getattr(self, name)
+            if move is not None:
+                floats(move.time, f"{name}.time", (len(floats(move.q, f"{name}.q", (None, n))),))
+                if len(move.q) < 2:
+                    raise InputError(f"{name}: expected a move with two corners or more, got one")
         if self.settings.weights is None:
             cast["settings"] = self.settings.resolve(self.robot, _mean_step(cast["time"]))
         for name, value in cast.items():

@@ -321,14 +321,16 @@ def build_program(
         Name and process values; default: `ProgramOptions()`.
     moves : sequence of TransferMove
         Transfer moves, as `kerfpath.sequence.plan_part` returns them: one less than plans, or one
-        more from and to a home position. Default: joint moves directly to each start.
+        more from and to a home position. Default: the approach and the retreat of a single plan,
+        else joint moves directly to each start.
     keywords : options of `ProgramOptions`
         They replace those of `options`.
 
     Raises
     ------
     InputError
-        There are no plans, plans or moves do not belong together, the joints do not lead the tool
+        There are no plans, plans or moves do not belong together, one of several plans has moves of
+        its own, the joints do not lead the tool
         along the contour, or the tool cannot back off by `retract`. Also as `ProgramOptions`.
     """
     if not plans:
@@ -344,7 +346,8 @@ def build_program(
     title = identifier(options.name or f"cut {first.name}")
     names = identifiers((plan.name for plan in plans), taken=(title,))
     *ways, home = _corners(plans, moves, options.retract)
-    share = options.air_speed or (PLANNED if moves else UNPLANNED)
+    known = [*moves, *(m for m in (first.approach, first.retreat) if m is not None and not moves)]
+    share = options.air_speed or (PLANNED if known else UNPLANNED)
     air = _Air(first, share, min(share, options.start_speed))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
@@ -361,7 +364,7 @@ def build_program(
         T_flange_tip=first.T_flange_tip,
         T_base_part=first.T_base_part,
         sections=tuple(sections),
-        air_checked=len(moves) > 0 and all(move.clear for move in moves),
+        air_checked=len(known) > 0 and all(move.clear for move in known),
         caveats=(*capsules, *options.remarks),
     )
     if options.arc_tolerance is not None:
@@ -506,7 +509,7 @@ def _corners(
 ) -> list[list[Array]]:
     """Return the joint vectors on the way to each of P plans, then those after the last."""
     if not moves:
-        return [*([back_off(plan, "start", retract)] for plan in plans), []]
+        return _own_corners(plans, retract)
     ways = [list(move.q[1:]) for move in moves]
     if len(moves) == len(plans) - 1:
         _require_meeting(plans, moves, retract)
@@ -520,6 +523,30 @@ def _corners(
     )
 
 
+def _own_corners(plans: Sequence[Plan], retract: float) -> list[list[Array]]:
+    """Return the corners of plans without moves between them, as `_corners`."""
+    starts = [[back_off(plan, "start", retract)] for plan in plans]
+    own = [plan for plan in plans if plan.approach is not None or plan.retreat is not None]
+    if not own:
+        return [*starts, []]
+    if len(plans) > 1:
+        raise InputError(
+            f"build_program: contour {own[0].name!r} has an approach or a retreat of its own, but "
+            f"there are {len(plans)} plans; give the moves between them, or write a program for "
+            "each"
+        )
+    plan, back = plans[0], list[Array]()
+    meetings: list[tuple[Array, Plan, End]] = []
+    if plan.approach is not None:
+        starts = [list(plan.approach.q)]
+        meetings.append((plan.approach.q[-1], plan, "start"))
+    if plan.retreat is not None:
+        back = list(plan.retreat.q[1:])
+        meetings.append((plan.retreat.q[0], plan, "end"))
+    _require_met(meetings, retract)
+    return [*starts, back]
+
+
 def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float) -> None:
     """Raise InputError unless moves begin and end where the tool is backed off."""
     between = len(moves) < len(plans)
@@ -528,6 +555,11 @@ def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retra
     meetings: list[tuple[Array, Plan, End]] = []
     meetings += [(move.q[-1], p, "start") for move, p in zip(into, starts, strict=True)]
     meetings += [(move.q[0], p, "end") for move, p in zip(out, ends, strict=True)]
+    _require_met(meetings, retract)
+
+
+def _require_met(meetings: Sequence[tuple[Array, Plan, End]], retract: float) -> None:
+    """Raise InputError unless joints of moves are where the tool is backed off from their plans."""
     for q, plan, end in meetings:
         T = plan.robot.forward(np.array([q, back_off(plan, end, retract)])) @ plan.T_flange_tip
         if (off := np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])) > MEETS:

@@ -122,7 +122,8 @@ def refine(
     Returns
     -------
     Refinement
-        If it fails, `done` is False, `plan` is the original plan, and `statement` says why.
+        If it fails, `done` is False, `plan` is the original plan, and `statement` says why. A
+        refined plan has no `approach` and no `retreat`: its ends may have moved.
 
     Raises
     ------
@@ -334,7 +335,9 @@ def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
     """
     q, turn = on_turns(plan.robot, found.q)
     proof = plan.proof.without_bound()
-    moved = replace(plan, q=q, gamma=wrap(found.free[:, 0]), turn=turn, proof=proof)
+    moved = replace(
+        plan, q=q, gamma=wrap(found.free[:, 0]), turn=turn, proof=proof, approach=None, retreat=None
+    )
     s, dq = plan.settings, np.diff(found.q, axis=0)
     return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 

@@ -14,4 +14,3 @@ from kerfpath.sequence.part import longest_search as longest_search
 from kerfpath.sequence.part import order_candidates as order_candidates
 from kerfpath.sequence.part import order_plans as order_plans
 from kerfpath.sequence.part import plan_part as plan_part
-from kerfpath.sequence.turned import turned as turned

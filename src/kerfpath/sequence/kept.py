@@ -11,10 +11,16 @@ import numpy as np
 from kerfpath.arrays import Array, floats, freeze
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.metric import increments_between
-from kerfpath.plans import Plan
-from kerfpath.sequence.order import Order, between_which
-from kerfpath.sequence.part import OrderKeywords, OrderOptions, PartPlan, on_near_turns
-from kerfpath.transfer import TransferMove, back_off, least_times, transfer_move
+from kerfpath.plans import Plan, TransferMove
+from kerfpath.sequence.order import Order
+from kerfpath.sequence.part import OrderKeywords, OrderOptions, PartPlan
+from kerfpath.transfer import (
+    back_off,
+    between_which,
+    least_times,
+    on_near_turns,
+    transfer_move,
+)
 
 SAME_END = 1e-6
 """rad, or m: rounding tolerance between an end of a move and where the tool has backed off."""

@@ -20,13 +20,20 @@ from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort, current_effort
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner import best_motion, folds, layered_graph, plan, with_bound
-from kerfpath.plans import Plan
-from kerfpath.robots import Robot, posture_name
-from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
-from kerfpath.sequence.turned import turned
+from kerfpath.planner import best_motion, folds, layered_graph, plan, turned, with_bound
+from kerfpath.plans import Plan, TransferMove
+from kerfpath.robots import Robot
+from kerfpath.sequence.order import Order, best_order
 from kerfpath.setup import Setup
-from kerfpath.transfer import End, TransferMove, back_off, explain_collision
+from kerfpath.transfer import (
+    HOME,
+    PATIENCE,
+    MoveTimes,
+    back_off,
+    can_back_off,
+    on_near_turns,
+    require_clear_ends,
+)
 
 # -----------------------------------------------------------------------------
 # Parts of many contours, of which less is compared for each.
@@ -48,11 +55,6 @@ def effort_for(contours: int) -> Iterator[None]:
 
 # -----------------------------------------------------------------------------
 # Select the candidates that the tool can approach and leave, and plan more where none is left.
-
-SAME_TURN = 1e-9
-"""Share of a turn by which rounding may take a joint beyond the room that it keeps."""
-BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
-"""Shares of the retract between which the joints are assumed to move linearly."""
 
 
 def unused_postures(made: Sequence[Plan], wanted: Iterable[int] | None) -> list[int]:
@@ -85,31 +87,6 @@ def common_postures(
     if len(able) > MANY:
         shared &= {p for p, _ in often.most_common(1)}
     return [sorted(each & shared) for each in able]
-
-
-def on_near_turns(made: Plan, *aims: Array | None) -> list[Plan]:
-    """Return a plan, and on the turns of its joints that are nearest to aims (n,) rad.
-
-    None stands for the middle of the joint ranges. Joints keep as far from their limits as before,
-    or half a turn.
-    """
-    robot, limits = made.robot, made.robot.joint_limits()
-    free = ~limits.endless & (np.arange(robot.joints) < robot.family.joints)
-    for coupling in robot.couplings:
-        free &= coupling.row[: len(free)] == 0
-    low, high = made.q.min(axis=0), made.q.max(axis=0)
-    room = np.minimum(np.minimum(low - limits.lower, limits.upper - high), np.pi)
-    least = np.ceil((limits.lower + room - low) / (2 * np.pi) - SAME_TURN)
-    most = np.floor((limits.upper - room - high) / (2 * np.pi) + SAME_TURN)
-    found, known = [made], {(0,) * robot.joints}
-    for aim in aims:
-        centre = (limits.lower + limits.upper) / 2 if aim is None else aim
-        wanted = np.where(free, np.round((centre - made.q.mean(axis=0)) / (2 * np.pi)), 0)
-        turns = np.where(free, np.clip(wanted, least, most), 0).astype(np.int64)
-        if tuple(turns.tolist()) not in known:
-            known.add(tuple(turns.tolist()))
-            found.append(replace(made, q=made.q + 2 * np.pi * turns, turn=made.turn + turns))
-    return found
 
 
 class MorePlans:
@@ -170,40 +147,11 @@ def _reachable(
     broken, found = None, []
     for c in which:
         try:
-            _require_clear_ends(made[c], cell, retract)
+            require_clear_ends(made[c], cell, retract)
             found.append(c)
         except NoFeasiblePath as error:
             broken = broken or error
     return broken, found
-
-
-def _can_back_off(made: Plan, retract: float) -> bool:
-    """Return whether the tool can back off from both ends within the joint limits."""
-    try:
-        _require_clear_ends(made, None, retract)
-    except NoFeasiblePath:
-        return False
-    return True
-
-
-def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
-    """Raise NoFeasiblePath where the tool cannot approach a cut or back off from it."""
-    ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
-    for end, node in ends:
-        try:
-            way = np.array([back_off(made, end, part * retract) for part in BACK_BY])
-        except InputError as broken:
-            raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
-        if cell is None:
-            continue
-        if not cell.clear_through(way):
-            raise NoFeasiblePath(
-                f"contour {made.name!r}: in posture {posture_name(int(made.posture[node]))} the "
-                f"tool is not clear while it backs off node {node} by {retract * 1e3:g} mm: "
-                f"{explain_collision(cell, way)}",
-                proved=True,
-                node=node,
-            )
 
 
 # -----------------------------------------------------------------------------
@@ -760,9 +708,7 @@ def order_plans(
         for i, c in places:
             one = every[i][c]
             aim = near.setdefault(int(one.posture[0]), one.q.mean(axis=0))
-            near_by = [
-                p for p in on_near_turns(one, home, aim) if _can_back_off(p, options.retract)
-            ]
+            near_by = [p for p in on_near_turns(one, home, aim) if can_back_off(p, options.retract)]
             plans = [*plans, *near_by]
             offered += [(i, c)] * len(near_by)
         group = np.array([i for i, _ in offered])
@@ -773,8 +719,9 @@ def order_plans(
         )
         if not options.heat_time:
             air.forbid(warm[np.ix_(group, group)])
-        if home is not None and air.home is None:
-            air.home = home
+        if home is not None:
+            air.come_from(home)
+            air.go_to(home)
         own = np.array([p.time[-1] - p.time[0] for p in plans])
         pierce = options.pierce_time
         each = np.array(pierce)[group if isinstance(pierce, Sequence) else ...]

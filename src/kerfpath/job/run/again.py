@@ -12,9 +12,10 @@ from kerfpath.job.format import CutRequest, PreparedJob
 from kerfpath.job.run.contour import advised, audited, plan_candidate
 from kerfpath.job.run.job import finished
 from kerfpath.job.run.results import CutResult, JobResult
+from kerfpath.planner import turned
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress
-from kerfpath.sequence import on_turns_of, rejoined, turned
+from kerfpath.sequence import on_turns_of, rejoined
 from kerfpath.transfer import TransferMove
 
 

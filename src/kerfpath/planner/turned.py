@@ -1,4 +1,6 @@
-"""Motions turned about the beam, so that the moves before and after them are short.
+"""Motions that cost nearly the same, turned about the beam or in another posture.
+
+They are for shorter moves before and after a cut.
 
 Where the last joint turns about the beam, a motion costs the same at every rotation of the head,
 and the one at which it is found is arbitrary. The moves between cuts are shorter if neighbouring
@@ -71,10 +73,45 @@ def turned(made: Plan, before: Array, after: Array, cell: Cell | None = None) ->
         if begun is None:
             continue
         refined += 1
-        found = _refined(begun, made.cost)
+        found = _refined(begun, made.cost, held=True)
         if found is not None and (cell is None or cell.clear_through(found.unwrapped)):
             return found
     return None
+
+
+def in_other_postures(made: Plan, cell: Cell | None = None) -> list[Plan]:
+    """Return the motion in other postures where it costs at most `ALIKE` more.
+
+    It begins at the same rotation about the beam and is refined. Where a wrist is spherical, its
+    other posture costs the same. None is returned for motions that `turned` does not turn.
+
+    Parameters
+    ----------
+    made : Plan
+    cell : Cell, optional
+        Cell in which the motions are clear.
+    """
+    if not _may_turn(made) or made.settings.floor is not None:
+        return []
+    robot, every = made.robot, made.settings.postures
+    limits = robot.joint_limits()
+    found = []
+    for posture in range(robot.postures) if every is None else every:
+        if posture == made.posture[0]:
+            continue
+        there = replace(made, posture=np.full(len(made.q), posture))
+        curves = JointCurves(robot, made.frames, made.T_flange_tip, there.posture)
+        way = np.unwrap(curves.at(made.gamma[:, None], made.unwrapped), axis=0)
+        if not np.isfinite(way).all():
+            continue
+        bound, centre = ~limits.endless, (way.min(axis=0) + way.max(axis=0)) / 2
+        middle = np.where(bound, (limits.lower + limits.upper) / 2, centre)
+        way = way + 2 * np.pi * np.round((middle - centre) / (2 * np.pi))
+        begun = _begun(there, 0.0, way)
+        one = None if begun is None else _refined(begun, made.cost, held=False)
+        if one is not None and (cell is None or cell.clear_through(one.unwrapped)):
+            found.append(one)
+    return found
 
 
 def _may_turn(made: Plan) -> bool:
@@ -127,11 +164,11 @@ def _begun(made: Plan, by: float, near: Array) -> Plan | None:
     return None if cost > (1 + HOPELESS) * made.cost else replace(begun, cost=cost)
 
 
-def _refined(begun: Plan, cost: float) -> Plan | None:
-    """Return a motion refined between its ends; None if it costs much more than `cost`."""
-    held = np.zeros((len(begun.q), 1), np.bool_)
-    held[[0, -1]] = True
-    low, high = (np.where(held, begun.gamma[:, None], far) for far in (-np.inf, np.inf))
-    found = refine(begun, first=FIRST_STEP, within=(low, high))
+def _refined(begun: Plan, cost: float, *, held: bool) -> Plan | None:
+    """Return a motion refined, with its ends `held` or not; None if it costs much more."""
+    fixed = np.zeros((len(begun.q), 1), np.bool_)
+    fixed[[0, -1]] = held
+    low, high = (np.where(fixed, begun.gamma[:, None], far) for far in (-np.inf, np.inf))
+    found = refine(begun, first=FIRST_STEP, within=(low, high) if held else None)
     dear = found.cost_after > (1 + ALIKE) * cost
     return found.plan if found.done and not dear else None

@@ -1,31 +1,19 @@
-"""Transfer moves: straight joint motions where they are clear, otherwise around obstacles."""
+"""A transfer move: straight where that is clear, otherwise around obstacles, and its time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, freeze, short_repr
+from kerfpath.arrays import Array, floats, freeze
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.extras import require_extra
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.robots import Robot, posture_name, require_axes
-
-__all__ = [
-    "End",
-    "TransferMove",
-    "back_off",
-    "explain_collision",
-    "least_time",
-    "least_times",
-    "speed_share",
-    "transfer_move",
-]
 
 # -----------------------------------------------------------------------------
 # Explain a collision: which bodies a motion brings too close together, where and by how much.
@@ -82,7 +70,7 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     plan : Plan
     end : {"start", "end"}
     retract : float m
-        How far the tool backs off.
+        How far the tool backs off; 0: not at all, at the end itself.
 
     Raises
     ------
@@ -92,6 +80,8 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     node = 0 if end == "start" else len(plan.q) - 1
     # Endless joints, not wrapped: with all their turns along the contour.
     q = plan.q[0] + plan.increments[:node].sum(axis=0)
+    if retract == 0:
+        return freeze(q)
     arm, n = plan.robot.arm, plan.robot.arm.joints
     T = arm.forward(q[:n]) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
@@ -208,32 +198,6 @@ def find_way_around(
 
 SECONDS = 10.0
 """s: default time limit of the search for a way around."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TransferMove:
-    """Straight joint motions from corner to corner, with a stop at each.
-
-    Parameters
-    ----------
-    q : (m, n) rad
-        Corners, including both ends.
-    time : (m,) s
-        Time at which each corner is reached, from 0.
-    clear : bool
-        Whether the move is proved clear in a cell; False where no cell was given.
-    """
-
-    q: Array
-    time: Array
-    clear: bool
-
-    __repr__ = short_repr
-
-    @property
-    def duration(self) -> float:
-        """Duration of the move (s)."""
-        return float(self.time[-1])
 
 
 def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
