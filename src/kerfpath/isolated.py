@@ -15,6 +15,7 @@ import resource
 import signal
 import subprocess
 import sys
+import sysconfig
 import threading
 import weakref
 from collections.abc import Callable, Collection
@@ -64,14 +65,15 @@ def python_command(code: str) -> list[str]:
     """Return the command of a Python process that runs `code` of kerfpath.
 
     It imports from where this process does, but not from the current folder or the folder of the
-    script that this process runs, unless kerfpath is there.
+    script that this process runs, unless kerfpath or the standard library (``python -m pdb``) is
+    there.
     """
     left_out = {"", os.curdir}
     with suppress(OSError):  # the current folder may have been removed
         left_out.add(str(Path.cwd()))
     if script := getattr(sys.modules.get("__main__"), "__file__", None):
         left_out.add(str(Path(script).absolute().parent))
-    left_out.discard(str(Path(__file__).parents[1]))
+    left_out -= {str(Path(__file__).parents[1]), sysconfig.get_path("stdlib")}
     path = [folder for folder in sys.path if folder not in left_out]
     return [sys.executable, "-P", "-c", f"import sys; sys.path[:] = {path!r}; {code}"]
 

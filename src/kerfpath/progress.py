@@ -111,14 +111,25 @@ def shown_by(show: Callable[[int, int], None]) -> Iterator[None]:
 
 
 @contextmanager
-def counted(about: int) -> Iterator[None]:
-    """Count the places inside where the work may be stopped; there are `about` so many of them."""
+def counted(about: int) -> Iterator[Callable[[int], None]]:
+    """Count the places inside where the work may be stopped; there are `about` so many of them.
+
+    The work calls what it gets with the number of places that are still to come whenever it knows
+    better. An estimate that turns out too low is raised by a quarter, so that the share of the
+    work done may fall, but is never close to all of it for long.
+    """
     show, done = _SHOW.get(), 0
 
+    def remain(places: int) -> None:
+        nonlocal about
+        about = done + places
+
     def step() -> None:
-        nonlocal done
+        nonlocal about, done
         done += 1
-        show(min(done, about - 1), about)
+        if done >= about:
+            about = done + max(1, done // 4)
+        show(done, about)
 
     with stopped_by(step):
-        yield
+        yield remain

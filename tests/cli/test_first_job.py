@@ -5,6 +5,8 @@ import json
 import ezdxf
 import numpy as np
 import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from tests.cad.test_meshes import box, square_tube, stl
 from tests.cad.test_part import write_step
 
@@ -195,7 +197,7 @@ def test_a_part_of_likely_size_asks_nothing(tmp_path):
         assert np.ptp(part.bounding_box[:, 0]) > 0
 
 
-@pytest.mark.parametrize(("radius", "spacing"), [(60.0, "2"), (4.0, "1"), (1.0, "0.5")])
+@pytest.mark.parametrize(("radius", "spacing"), [(60.0, "2"), (4.0, "1"), (1.0, "0.51")])
 def test_nodes_are_close_enough_for_small_radii(tmp_path, radius, spacing):
     path = tmp_path / "slot.dxf"
     drawing = ezdxf.new(units=4)
@@ -205,6 +207,42 @@ def test_nodes_are_close_enough_for_small_radii(tmp_path, radius, spacing):
     drawing.saveas(path)
     text = job_text(read(path), tmp_path / "slot.toml")
     assert f"spacing_mm = {spacing}\n" in text
+
+
+def test_a_small_circle_is_slower_by_the_lag_of_the_joints(tmp_path):
+    """A low-pass of sigma leaves v^2 sigma^2 / (2 r) of the radius off, here at most 0.055 mm."""
+    path = tmp_path / "plate.dxf"
+    drawing = ezdxf.new(units=4)
+    drawing.modelspace().add_lwpolyline([(0, 0), (200, 0), (200, 90), (0, 90)], close=True)
+    for x, radius in ((30, 4.0), (80, 20.0), (160, 30.0)):
+        drawing.modelspace().add_circle((x, 45), radius)
+    drawing.saveas(path)
+    job = tmp_path / "plate.toml"
+    job.write_text(job_text(read(path), job))
+    tasks = (each.task for each in prepare(read_job(job)).contours)
+    speeds = {task.pick: round(task.speed * 60, 9) for task in tasks}
+    small = speeds.pop("0/hole1")
+    lost = (0.025 * small / 60) ** 2 / (2 * 0.004)
+    assert 0.85 * 0.055e-3 < lost <= 0.055e-3  # the speed is rounded down to 0.1 m/min
+    assert len(speeds) == 3
+    assert set(speeds.values()) == {3.0}
+
+
+def test_a_loop_all_the_way_round_comes_with_the_lines_of_a_rotary_axis(tmp_path):
+    """They are comments, as there may be none; without the signs the job is read and checked."""
+    path = tmp_path / "tube.step"
+    wall = [BRepPrimAPI_MakeCylinder(radius, 200.0).Shape() for radius in (25.0, 23.0)]
+    write_step(path, BRepAlgoAPI_Cut(*wall).Shape())
+    job = tmp_path / "tube.toml"
+    text = job_text(read(path), job)
+    assert "all the way round" in text
+    start = text.index("# [[robot.external]]")
+    lines, rest = text[start:].split("\n\n", 1)
+    job.write_text(text[:start] + lines.removeprefix("# ").replace("\n# ", "\n") + "\n\n" + rest)
+    with_axis = read_job(job)
+    (axis,) = with_axis.robot.externals
+    assert axis.carries == "part"
+    assert np.allclose(np.abs(axis.axis @ with_axis.placement[:3, :3]), [0, 0, 1])
 
 
 HANDED_ON = {

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from kerfpath import Contour, InputError, join
-from kerfpath.contour import KINDS
+from kerfpath.contour import KINDS, turned_about, unit
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -312,3 +312,23 @@ def test_kinds_survive_joining_and_closing():
     b = Contour([[1, 0, 0], [1, 1, 0], [0, 1, 0]], np.tile(DOWN, (3, 1)))
     assert join([a, b]).kinds == ("pierce", "cut", "cut", "cut")
     assert join([a, b], closed=True).kinds == ("pierce", "cut", "cut", "cut", "cut")
+
+
+@pytest.mark.parametrize("cone", [0.0, 0.5, -1.0])
+def test_axes_that_turn_all_the_way_round_do_so_about_one_direction(cone):
+    t = np.linspace(0.3, 2 * np.pi + 0.3, 73)
+    about = unit(np.array([[0.2, -0.5, 0.8]]))[0]
+    x = unit(np.cross(about, [[1.0, 0.0, 0.0]]))[0]
+    across = np.cos(t)[:, None] * x + np.sin(t)[:, None] * np.cross(about, x)
+    axes = np.cos(cone) * across + np.sin(cone) * about
+    found = turned_about(axes)
+    assert found is not None
+    assert abs(found @ about) == pytest.approx(1.0, abs=1e-9)
+    assert turned_about(axes[:60]) is None  # up to 295 deg
+    assert turned_about(np.concatenate([axes[:40], axes[39::-1]])) is None  # there and back
+
+
+def test_axes_that_hardly_turn_do_not_turn_round():
+    rng = np.random.default_rng(2)
+    assert turned_about(np.tile([0.0, 0.0, -1.0], (9, 1))) is None
+    assert turned_about(unit([0.0, 0.0, -1.0] + 0.1 * rng.normal(size=(50, 3)))) is None

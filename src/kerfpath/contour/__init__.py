@@ -8,4 +8,5 @@ from kerfpath.contour.contour import join as join
 from kerfpath.contour.sampling import CORNER as CORNER
 from kerfpath.contour.sampling import angle_between as angle_between
 from kerfpath.contour.sampling import slerp as slerp
+from kerfpath.contour.sampling import turned_about as turned_about
 from kerfpath.contour.sampling import unit as unit

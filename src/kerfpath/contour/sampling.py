@@ -16,6 +16,11 @@ from kerfpath.errors import InputError
 ZERO = 1e-9
 """A vector shorter than this (any unit) has no direction."""
 
+ASIDE = float(np.sin(np.radians(20.0)))
+"""Least distance of unit vectors from the direction about which they turn."""
+ALL_ROUND = float(np.radians(345.0))
+"""Angle from which on unit vectors turn all the way round."""
+
 
 def unit(vectors: Array, name: str = "axes") -> Array:
     """Return vectors (K, 3) scaled to unit length.
@@ -37,6 +42,20 @@ def angle_between(n0: Array, n1: Array) -> Array:
     """Return the angle (...,) rad between unit vectors (..., 3), accurate for tiny ones too."""
     sine = np.linalg.norm(np.cross(n0, n1), axis=-1)
     return np.asarray(np.arctan2(sine, (n0 * n1).sum(-1)))
+
+
+def turned_about(axes: Array) -> Array | None:
+    """Return the direction (3,) about which unit vectors (K, 3) turn all the way round.
+
+    None if they do not turn all the way about any direction, or come close to it somewhere: there
+    the angle about it is undetermined.
+    """
+    direction = np.linalg.svd(axes - axes.mean(axis=0))[2]
+    along, x, y = direction[2], axes @ direction[0], axes @ direction[1]
+    if np.hypot(x, y).min() < ASIDE:
+        return None
+    turned = np.ptp(np.unwrap(np.arctan2(y, x)))
+    return along if turned > ALL_ROUND else None
 
 
 def slerp(n0: Array, n1: Array, part: Array) -> Array:

@@ -11,8 +11,9 @@ import numpy as np
 from kerfpath.arrays import Array, counted
 from kerfpath.cad import EDGE_TURN, GAP, Loop, Machine, Part
 from kerfpath.cad.drawing_frame import ASK
-from kerfpath.contour import Contour
+from kerfpath.contour import Contour, turned_about
 from kerfpath.errors import InputError
+from kerfpath.execution import ASSUMED
 from kerfpath.job.format import Drawing, pose, toml_lines, toml_value
 from kerfpath.post import languages
 from kerfpath.robots import Robot
@@ -32,11 +33,16 @@ NODES = 400
 """Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
 """Distance between nodes, mm, unless a curve needs less or a loop would have too many."""
-CLOSEST = 0.25
-"""Distance between nodes, mm, that is not halved again."""
+CLOSEST, CLOSER = 0.25, 0.8
+"""Distance between nodes, mm, that is not reduced again, and the factor that reduces it."""
 CHORD = 5e-5
 """Largest distance of the drawn curve from the chords between nodes, m; half of what the audit
 allows by default."""
+SPEED, STEPS = 3.0, 10
+"""Speed of the cuts, m/min, and number of speeds of circles in each m/min."""
+OFF = 5.5e-5
+"""Distance from the drawn circle that the lag of the joints may cause at these speeds, m: about
+half of what the audit allows; rounded corners take the rest."""
 BENT = np.radians(20.0)
 """Least angle of the tool axis from its mean along a loop at which the loop passes bends."""
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
@@ -62,6 +68,25 @@ rpy_deg = {rpy}              # guess: how the part is turned there; the beam com
 
 # {cut} at a guessed speed; `kerfpath contours {drawing}` lists them all.
 """
+ROUND = """\
+# The beam goes all the way round {loop}. Where the arm alone cannot, a rotary axis that carries
+# the part can (without the signs #):
+# [[robot.external]]
+# name = "table"
+# kind = "rotary"
+# carries = "part"
+# axis = {axis}
+# point_mm = {point}
+# endless = true
+# velocity_deg_s = 120         # guess
+# acceleration_deg_s2 = 200    # guess
+{unit}
+"""
+UNIT = """\
+# [program.rapid]
+# mechanical_units = ["STN1"]  # guess
+"""
+"""Lines for a loop all the way round, such as the end of a tube, and those that RAPID needs."""
 TAIL = """\
 [plan]
 gamma_step_deg = 2          # step of the free rotation about the beam
@@ -118,6 +143,11 @@ def job_text(
     axes = [contour.axes for contour in dense]
     xyz = _place(part, rpy, used.reach or REACH)
     file = Path(relpath(part.path, job.parent)).as_posix()
+    placed = pose(xyz, rpy)
+    spoken = (name for name, each in languages().items() if used.manufacturer in each.manufacturers)
+    language = next(spoken, "csv")
+    unit = UNIT if language == "rapid" else ""
+    turning = (_turning(loop.name, along[loop.name], placed, unit) for loop in reversed(longest))
     head = HEAD.format(
         drawing=part.path.name,
         job=job.name,
@@ -131,15 +161,29 @@ def job_text(
         cut=_below([loop for loop in longest if level and loop not in level])
         + _cut(part, chosen, lines if main is not lines else ()),
     )
-    spoken = (name for name, each in languages().items() if used.manufacturer in each.manufacturers)
     tail = TAIL.format(
         feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
-        language=next(spoken, "csv"),
+        language=language,
     )
     contours = (
         _contour(loop, _spacing(part, along)) for loop, along in zip(chosen, dense, strict=True)
     )
-    return head + "".join(contours) + tail
+    return head + next(filter(None, turning), "") + "".join(contours) + tail
+
+
+def _turning(loop: str, along: Contour, placed: Array, unit: str) -> str:
+    """Return the lines of a rotary axis for a loop all the way round; "" for another."""
+    about = turned_about(along.axes)
+    if about is None:
+        return ""
+    axis = placed[:3, :3] @ about
+    axis *= np.sign(axis[np.abs(axis).argmax()])
+    points = along.points @ placed[:3, :3].T + placed[:3, 3]
+    point = ((points.min(axis=0) + points.max(axis=0)) / 2 * 1e3).round(1) + 0.0
+    direction = (axis.round(6) + 0.0).tolist()
+    return ROUND.format(
+        loop=loop, axis=toml_value(direction), point=toml_value(point.tolist()), unit=unit
+    )
 
 
 def _is_bent(axes: Array) -> bool:
@@ -226,13 +270,28 @@ def _spacing(part: Part, along: Contour) -> float:
         nodes = along.resample(spacing=spacing / 1e3)
         if part.departure(along.name, nodes).chord_error <= CHORD:
             break
-        spacing /= 2
+        spacing = float(f"{max(CLOSEST, CLOSER * spacing):.2g}")
     return spacing
 
 
 def _contour(loop: Loop, spacing: float) -> str:
-    name = toml_value(loop.name)
-    return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
+    speed = _speed(loop)
+    slower = "" if speed == SPEED else "       # guess: slower, as the joints lag on a small circle"
+    return (
+        f"[[contour]]\npick = {toml_value(loop.name)}\nspeed_m_min = {speed:g}{slower}\n"
+        f"spacing_mm = {spacing:g}\n\n"
+    )
+
+
+def _speed(loop: Loop) -> float:
+    """Return a speed, m/min, at which a lag of the joints as assumed leaves a circle its size.
+
+    A low-pass of standard deviation sigma takes (sigma v)^2 / (2 r) off the radius r.
+    """
+    if loop.diameter is None:
+        return SPEED
+    highest = np.sqrt(OFF * loop.diameter) / ASSUMED.sigma.max() * 60
+    return float(min(SPEED, max(1, np.floor(STEPS * highest)) / STEPS))
 
 
 def _turned(rpy: tuple[int, ...]) -> Array:

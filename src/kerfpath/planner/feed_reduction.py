@@ -45,8 +45,9 @@ SLOWER = (1.0, 1.2, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 20.0, 50.0)
 """Node intervals at which a path is to keep all limits, as multiples of the one asked for."""
 PROGRAMS = 10
 """Most convex programs that reduce the excess; sixty gained 0.1 % of the time on 728 nodes."""
-STEPS = 100
-"""Convex programs and beam searches that this usually takes, to estimate the time left."""
+STEPS, THROUGH_VALLEYS, SHORTENING = 110, 150, 45
+"""Convex programs and searches that slowing the first two paths usually takes, slowing motions
+through all valleys, and shortening each of the quickest; to estimate the time left."""
 LOST = 1e-3
 """Share of the time that a plan may lose before motions through all valleys are slowed, too."""
 SAME_TIME = 1e-4
@@ -77,7 +78,7 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
     clear: list[Plan] = []
     tried: list[Plan] = []
     try:
-        with counted(STEPS):
+        with counted(STEPS) as remain:
             for path in _paths(task, finder):
                 made = task.plan_between(path, _claim(finder))
                 if not any(alike(made, other) for other in tried):
@@ -85,8 +86,12 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
                     slowed = _slowed_between(task, finder, path, made)
                     clear += [] if slowed is None else [slowed]
             if not any(_hardly_slower(task, made) for made in clear):
-                clear += _through_valleys(task, finder) if can_explore(task) else []
-                for made in sorted(clear, key=_quickest_followed)[:SHORTENED]:
+                if can_explore(task):
+                    remain(THROUGH_VALLEYS + SHORTENED * SHORTENING)
+                    clear += _through_valleys(task, finder)
+                quickest = sorted(clear, key=_quickest_followed)[:SHORTENED]
+                for left, made in zip(range(len(quickest), 0, -1), quickest, strict=True):
+                    remain(left * SHORTENING)
                     clear += _shortened(task, finder, made)
     except StopEarly:
         if not clear:

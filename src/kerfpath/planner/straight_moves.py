@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Bools, Ints
-from kerfpath.contour import Contour, angle_between
+from kerfpath.contour import Contour, angle_between, turned_about
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan
@@ -145,7 +145,13 @@ def _near_the_line(made: Plan, moves: Ints) -> Bools:
 
 
 def remedy(contour: Contour) -> str:
-    """Return what may give a motion where the tool axis turns sharply."""
+    """Return what may give a motion where the tool axis turns sharply, or all the way round."""
+    if turned_about(contour.axes) is not None:
+        return (
+            "the tool axis turns all the way round, which a rotary axis that carries the part "
+            "([[robot.external]] in a job) can do; or stop where the posture changes "
+            '(interruptions = "fewest")'
+        )
     turns = angle_between(contour.axes[:-1], contour.axes[1:])
     k = int(np.argmax(turns))
     return (
