@@ -82,6 +82,7 @@ lock: .venv/tools.stamp
 	$(LOCK) --extra cad --extra cells --extra programs --extra report --extra studio pyproject.toml -c requirements/dev.txt -o requirements/run.txt
 	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt
 	$(LOCK:--universal=--python-platform x86_64-manylinux_2_35) requirements/planners.in -o requirements/planners.txt
+	$(LOCK) --extra compas pyproject.toml -c requirements/dev.txt -o requirements/compas.txt
 	$(LOCK) --extra docs pyproject.toml -c requirements/dev.txt -o requirements/docs.txt
 
 clean:

@@ -12,6 +12,7 @@ NEEDS = {
     "cad": ("OCP", "ezdxf"),
     "cells": ("coal", "ompl"),
     "cluster": ("distributed",),
+    "compas": ("compas_fab",),
     "general": ("ssik",),
     "programs": (
         "ortools", "pydantic", "python_calamine", "rich", "tomlkit", "tree_sitter",

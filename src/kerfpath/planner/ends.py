@@ -15,6 +15,7 @@ from kerfpath.plans import Plan
 from kerfpath.setup import Setup
 from kerfpath.transfer import (
     PATIENCE,
+    SECONDS,
     MoveTimes,
     can_back_off,
     on_nearest_turns,
@@ -25,9 +26,6 @@ CALLED = ("start_q", "end_q")
 """What the ends are called in messages."""
 NEAREST = 32
 """Most turns on which each motion is offered."""
-SECONDS = 5.0
-"""s: time limit of each search for a way around. Where one fails, the other turns of its posture
-are only reached straight; `PATIENCE` searches may fail."""
 BEYOND = 1e-9
 """rad: rounding by which an end may be beyond a joint limit."""
 
@@ -85,7 +83,9 @@ class Ends:
         """Return one of some plans on turns of its joints, with the moves to it and from it.
 
         Of all that the robot can come to and leave, it is the one whose moves take the least time;
-        each plan is offered on the `NEAREST` turns. Endless joints go the short way.
+        each plan is offered on the `NEAREST` turns. Endless joints go the short way. Where no way
+        around is found in `SECONDS`, the other turns of that posture are only reached straight;
+        `PATIENCE` searches may fail.
 
         Raises
         ------

@@ -17,6 +17,7 @@ from kerfpath.certificate import Certify
 from kerfpath.certifier import SharedWork, certify
 from kerfpath.compiling import finish_compiling
 from kerfpath.contour import Contour
+from kerfpath.effort import changed_effort
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss
@@ -214,6 +215,11 @@ def with_bound(
 # -----------------------------------------------------------------------------
 # plan(): the best joint motion of a robot along a contour.
 
+WITHOUT_PROOFS = {
+    "infeasibility_steps": 0, "infeasibility_tubes": 0, "binding_nodes": 0, "speed_factors": (),
+}  # fmt: skip
+"""Effort in other postures: where they have no motion, nobody asks for a proof."""
+
 
 def plan(
     contour: Contour,
@@ -349,8 +355,17 @@ def plan(
 
     def in_posture(posture: int) -> Plan:
         alone = replace(asked, postures=(posture,), certify=None)
-        return plan(contour, robot, tool=tool, placement=placement, speed=speed, options=alone,
-                    cell=cell, external=external)  # fmt: skip
+        with changed_effort(**WITHOUT_PROOFS):
+            return plan(
+                contour,
+                robot,
+                tool=tool,
+                placement=placement,
+                speed=speed,
+                options=alone,
+                cell=cell,
+                external=external,
+            )
 
     (phase or unheard)("moves")
     made = _joined(made, ends, in_posture)

@@ -230,6 +230,26 @@ def least_times(robot: Robot, q: Array, eta_v: float = 1.0, eta_a: float = 1.0) 
     return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 
 
+def share_of_way(way: Array, velocity: Array, acceleration: Array, share: Array) -> Array:
+    """Return how far (m,) a joint motion from stop to stop is after each share (m,) of its time.
+
+    Its speed rises evenly, stays, and falls; or only rises and falls.
+
+    Parameters
+    ----------
+    way : (n,) rad
+        How far each joint moves; all at least 0.
+    velocity, acceleration : (n,) rad/s, rad/s^2
+    share : (m,)
+        From 0 to 1.
+    """
+    took = float(least_time(way[None], velocity, acceleration)[0])
+    ramp = min(1 - (way / velocity).max() / took, 0.5) if took else 0.5
+    near = np.minimum(share, 1 - share)
+    part = np.where(near < ramp, near**2 / (2 * ramp), near - ramp / 2) / (1 - ramp)
+    return np.where(share <= 0.5, part, 1 - part)
+
+
 def speed_share(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike, time: Array) -> Array:
     """Return the shares (B,) of full velocity at which motions dq (B, n) rad take times (B,) s.
 

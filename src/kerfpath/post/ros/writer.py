@@ -32,7 +32,7 @@ from kerfpath.post.languages import (
 )
 from kerfpath.post.program import CircularMove, JointMove, LinearMove, Program, ProgramIssue, Wait
 from kerfpath.robots import Robot, base_in_part, joint_identifiers
-from kerfpath.transfer import least_time
+from kerfpath.transfer import share_of_way
 
 # -----------------------------------------------------------------------------
 # A program as joints over time: sampled in moves from stop to stop, else node by node.
@@ -99,7 +99,9 @@ def trajectory(program: Program, step_time: float) -> Trajectory:
             count = int(np.ceil((end - start) / step_time - 1e-9)) if between_stops else 1
             share = np.arange(1, count + 1) / max(count, 1)
             if isinstance(step, JointMove):
-                way = before + _trapezoid(program, before, step, share) * (step.q - before)
+                way = step.q - before
+                far = share_of_way(np.abs(way), *program.robot.speed_limits(), share)
+                way = before + far[:, None] * way
             else:
                 way = _straight(program, step, before, tips[number - 1], share)
             way = np.vstack([way[:-1], step.q])
@@ -115,20 +117,6 @@ def trajectory(program: Program, step_time: float) -> Trajectory:
         stops=np.concatenate(stops),
         done=np.array(done),
     )
-
-
-def _trapezoid(program: Program, before: Array, move: JointMove, share: Array) -> Array:
-    """Return how far (m, 1) a joint motion from stop to stop is after each share of its time.
-
-    Its speed rises evenly, stays, and falls; or only rises and falls.
-    """
-    velocity, acceleration = program.robot.speed_limits()
-    way = np.abs(move.q - before)
-    took = float(least_time(way[None], velocity, acceleration)[0])
-    ramp = min(1 - (way / velocity).max() / took, 0.5) if took else 0.5
-    near = np.minimum(share, 1 - share)
-    part = np.where(near < ramp, near**2 / (2 * ramp), near - ramp / 2) / (1 - ramp)
-    return np.where(share <= 0.5, part, 1 - part)[:, None]
 
 
 def _straight(
