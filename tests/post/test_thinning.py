@@ -20,6 +20,7 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
+from kerfpath.post.thinning import Thinning
 from programs import frames, hand_plan
 
 SPEED = 2 / 60
@@ -187,3 +188,21 @@ def test_an_edit_may_leave_out_nodes_only_where_moves_are_too_short():
     assert not may_replace(controller, 0.003, 30)
     assert not may_replace(controller, 0.030, 2)
     assert not may_replace(Controller(), 0.001, 2)
+
+
+@pytest.mark.parametrize("bent", [40, 41])
+def test_targets_where_the_path_bends_least_are_left_out(bent):
+    # 101 moves become 49 of two and one of three: where that one is decides which targets remain.
+    points = straight(102).points.copy()
+    points[bent, 1] = 5e-6
+    axes = np.tile([0.0, 0.0, -1.0], (102, 1))
+    x = np.tile([1.0, 0.0, 0.0], (102, 1))
+    plan = planned("rapid", Contour(points, axes, x=x, name="bent"))
+    program = build_program([plan], zone=1e-4, language="none")
+    thinning = Thinning(
+        controller=Controller(shortest=0.005), tolerance=1e-5, zone=1e-4, zone_error=1e-5
+    )
+    moves = inner(thinning.of(program))
+    assert len(moves) == 50
+    corner = inner(program)[bent - 1].T_part_tip
+    assert any((move.T_part_tip == corner).all() for move in moves)

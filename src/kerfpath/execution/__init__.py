@@ -28,7 +28,6 @@ from kerfpath.execution.fitting import Tried as Tried
 from kerfpath.execution.fitting import fit_response as fit_response
 from kerfpath.execution.fitting import read_log as read_log
 from kerfpath.execution.fitting import response_text as response_text
-from kerfpath.execution.keep import ROUNDS as ROUNDS
 from kerfpath.execution.keep import Kept as Kept
 from kerfpath.execution.keep import keep_limits as keep_limits
 from kerfpath.execution.keep import longest_run as longest_run

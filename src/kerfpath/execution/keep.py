@@ -23,6 +23,10 @@ CLOSER = 0.003
 """Reduction of the aim if only the proof is missing."""
 LEAST = 0.05
 """Smallest share of a limit that is left to a node."""
+PROGRAMS = 12
+"""Most convex programs of each descent in a refinement: one that needs more ends far away."""
+AWAY = 1.2
+"""Multiple of the least need so far from which on a motion is another one, which is left."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -92,6 +96,7 @@ def keep_limits(
     into, _ = meetings(intervals, periodic=plan.settings.closure == "periodic")
     kept = KeptShares(np.ones((intervals, n)), np.ones((len(into), n)))
     made, aim, why = plan, AIM, "lower limits at the nodes do not reduce it"
+    least = np.inf
     for count in range(rounds + 1):
         if max(run.velocity_bound, run.acceleration_bound) <= 1:
             statement = "it keeps the limits between the nodes, too"
@@ -107,12 +112,15 @@ def keep_limits(
             break
         aim -= CLOSER if worst <= 1 else 0.0
         kept = _held(made, run, kept, aim)
-        refined = refine(made, kept=kept)
+        refined = refine(made, kept=kept, most=PROGRAMS)
         if not refined.done:
             why = refined.statement.removeprefix("not refined: ")
             break
         made = refined.plan
         run = longest_run(program(made), controller) or run
+        least = min(least, worst)
+        if run.most > AWAY * least:
+            break
     statement = _need(plan, first, why)
     return Kept(plan=plan, done=False, rounds=count, run=first, statement=statement)
 

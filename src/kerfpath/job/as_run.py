@@ -13,7 +13,6 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, about
 from kerfpath.execution import (
     AT_SPEED,
-    ROUNDS,
     Compensation,
     Executed,
     Kept,
@@ -281,18 +280,15 @@ def _nearest(plan: Plan, T: Array) -> int:
     return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - T[:3, 3], axis=1)))
 
 
-def kept_between_nodes(job: Job, plan: Plan, *, rounds: int = ROUNDS) -> Kept | None:
+def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
     """Return the plan with lower limits at its nodes, so that those between them hold.
 
-    None if the job does not ask for it, or its program cannot be made. It takes so many `rounds`
-    at most.
+    None if the job does not ask for it, or its program cannot be made.
     """
     if not keeps_between_nodes(job):
         return None
     try:
-        return keep_limits(
-            plan, _program(job), controller=job.program.rules.controller, rounds=rounds
-        )
+        return keep_limits(plan, _program(job), controller=job.program.rules.controller)
     except InputError:  # reported when the program is written
         return None
 

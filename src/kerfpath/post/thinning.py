@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.post.arcs import Zone, zones_at
 from kerfpath.post.languages import STRETCHED, Controller
 from kerfpath.post.program import LinearMove, Program, Section, Step
@@ -20,9 +20,11 @@ LONGEST = 3.0
 """Longest move that replaces others, in shortest moves of the controller."""
 MOST = 64
 """Largest number of moves that one replaces."""
-REMOVED, UNEVEN = 1e-7, 1e-10
-"""Cost (s) of each target left out, and of the square of the moves that one replaces, so that
-there is one best choice."""
+REMOVED, BENT, UNEVEN = 1e-7, 1e-8, 1e-10
+"""Cost (s) of each target left out, of the square of how far the moves that one replaces are from
+straight, as a share of what is allowed, and of the square of their number. So there is one best
+choice, which leaves out the targets where the path bends least: what may just be left out is not,
+where something else may be, and a slightly different path keeps the same targets."""
 
 
 def may_replace(controller: Controller, interval: float, count: int) -> bool:
@@ -117,9 +119,9 @@ class Thinning:
             time = at[d:] - at[:-d]
             turns.append(_turns(T, d))
             good = time <= longest if d > 1 else np.ones(len(time), dtype=bool)
-            good &= _straight(T, q, at, turns, self.tolerance, most)
+            bent = _bends(T, q, at, turns, self.tolerance, most)
             own = time * self.controller.stretch(time) + REMOVED * (d - 1) + UNEVEN * d**2
-            cost[d:, d - 1] = np.where(good, own, np.inf)
+            cost[d:, d - 1] = np.where(good & (bent <= 1), own + BENT * bent**2, np.inf)
         best, before = np.zeros(m + 1), np.zeros(m + 1, dtype=int)
         for j in range(1, m + 1):
             reach = min(j, widest)
@@ -176,24 +178,27 @@ def _turns(T: Array, d: int) -> Array:
     return np.asarray(turned.as_rotvec())
 
 
-def _straight(
+def _bends(
     T: Array, q: Array, at: Array, turns: Sequence[Array], tolerance: float, most: Array
-) -> Bools:
-    """Return whether straight moves, each over d others, stay near the ends of these, (m + 1 - d,).
+) -> Array:
+    """Return how far ends are from straight moves, each over d others, as a share, (m + 1 - d,).
 
-    At the same share of the time, the tip is within `tolerance` (m) of each end T (m + 1, 4, 4) m,
-    the tool within `ANGLE`, and each joint within `most` (n,) of q (m + 1, n). `turns` are those of
-    `_turns` over 1 to d moves.
+    At the same share of the time, the tip is to be within `tolerance` (m) of each end
+    T (m + 1, 4, 4) m, the tool within `ANGLE`, and each joint within `most` (n,) of q (m + 1, n).
+    `turns` are those of `_turns` over 1 to d moves. The largest of these counts.
     """
     d = len(turns)
-    good = np.ones(len(at) - d, dtype=bool)
+    bent = np.zeros(len(at) - d)
     for k in range(1, d):
         last = len(at) - d + k
         share = ((at[k:last] - at[:-d]) / (at[d:] - at[:-d]))[:, None]
         tip = T[:-d, :3, 3] + share * (T[d:, :3, 3] - T[:-d, :3, 3]) - T[k:last, :3, 3]
         turned = share * turns[-1] - turns[k - 1][: last - k]
         joints = q[:-d] + share * (q[d:] - q[:-d]) - q[k:last]
-        good &= np.linalg.norm(tip, axis=1) <= tolerance
-        good &= np.linalg.norm(turned, axis=1) <= ANGLE
-        good &= (np.abs(joints) <= most).all(axis=1)
-    return good
+        for off in (
+            np.linalg.norm(tip, axis=1) / tolerance,
+            np.linalg.norm(turned, axis=1) / ANGLE,
+            (np.abs(joints) / most).max(axis=1),
+        ):
+            bent = np.maximum(bent, off)
+    return bent

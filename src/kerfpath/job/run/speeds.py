@@ -11,7 +11,7 @@ from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.execution import ROUNDS, Executed, Kept, share_within
+from kerfpath.execution import Executed, Kept, share_within
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import allowed_off, keeps_between_nodes, kept_between_nodes, run_of
 from kerfpath.job.format import ContourSpec, Job, prepare
@@ -25,8 +25,6 @@ from kerfpath.progress import Progress, no_progress
 HALVINGS, CLOSE = 4, 1.02
 """Most bisections between a speed that keeps the limits and one that was not found to; and the
 factor between them from which on there are none."""
-DRAFT_ROUNDS = 3
-"""Most refinements of a draft so that it keeps the limits: where more are needed, few succeed."""
 SLOWER = 0.97
 """Factor on a speed that does not keep the limits, for the next one that is tried."""
 TRIES = 4
@@ -109,9 +107,7 @@ def _kept(
 ) -> Kept | None:
     """Return a plan at a speed with the limits kept between its nodes; None without a plan."""
     made = _planned(job, nodes, cell, speed, draft=draft)
-    if made is None:
-        return None
-    return kept_between_nodes(job, made, rounds=DRAFT_ROUNDS if draft else ROUNDS)
+    return None if made is None else kept_between_nodes(job, made)
 
 
 def _planned(
