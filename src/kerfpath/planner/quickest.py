@@ -48,6 +48,9 @@ HOPELESS = 1.5
 """A screened motion that needs this many times the best interval is left."""
 ROUNDS = 2
 """Times that the best motion is shaken."""
+ALIKE_BOUND, SAME_END = 3, 1e-4
+"""Number of motions with the best interval, to this relative difference, but another gamma, from
+which on no more are looked for: they are bound where gamma changes nothing."""
 FAR = 2.0
 """Multiple of a wanted interval from which on valleys are not explored: they hardly gain it."""
 NEAR, CLOSE = 1.25, 1.05
@@ -99,9 +102,10 @@ def quick_motions(
     that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
     at the speed reached and above give the others, whatever they cost, until the speed no longer
     grows, and, if `explore`, courses through all valleys, twice, and again as long as the last
-    ones gained. The speed, closure and costs of the task do not matter: tasks that differ only in
-    them have the same motions, in the same order. Where the motions stay far from the `wanted`
-    interval, s, the last of them are not looked for.
+    ones gained. All end where several motions that differ have the best interval. The speed,
+    closure and costs of the task do not matter: tasks that differ only in them have the same
+    motions, in the same order. Where the motions stay far from the `wanted` interval, s, the last
+    of them are not looked for.
 
     Raises
     ------
@@ -117,42 +121,72 @@ def quick_motions(
     best = faster_motion(task, finder, path, best)
     yield best
     explore = explore and can_explore(task)
-    tried, known = [path], list[Course]()
+    tried, seen = [path], _Seen()
     factors, begun = current_effort().speed_factors, best.dt
     enough = (CLOSE if len(task.contour) >= MANY else NEAR) * wanted
     for factor in factors[:1]:
-        for found in _by_beam(task, finder, best, factor, tried):
+        for found in _by_beam(task, finder, best, factor, tried, seen):
             best = found
             yield best
     if explore and best.dt <= (NEAR if len(task.contour) >= MANY else FAR) * wanted:
         for found in _through_valleys(
-            task, finder, best, factor=FACTORS[0], known=known, enough=enough
+            task, finder, best, factor=FACTORS[0], seen=seen, enough=enough
         ):
             best = found
             yield best
     if can_explore(task) and best.dt > enough:
         return
     without_gain = int(best.dt >= (1 - GAIN) * begun)
-    while without_gain < len(factors):
+    while without_gain < len(factors) and not seen.settled(best):
         before = best.dt
-        for found in _by_beam(task, finder, best, factors[without_gain], tried):
+        for found in _by_beam(task, finder, best, factors[without_gain], tried, seen):
             best = found
             yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
     valleys = [partial(_through_valleys, factor=factor) for factor in FACTORS[1:]]
     searches: list[Callable[..., Iterator[QuickMotion]]] = [*valleys, _shaken]
     for search in searches:
-        if not explore:
+        if not explore or seen.settled(best):
             return
         before = best.dt
-        for found in search(task, finder, best, known=known):
+        for found in search(task, finder, best, seen=seen):
             best = found
             yield best
         explore = best.dt < (1 - GAIN) * before
 
 
+class _Seen:
+    """The courses that were moved to their least interval, and the motions that they led to."""
+
+    def __init__(self) -> None:
+        self.courses, self._ends = list[Course](), list[Plan]()
+
+    def faster(
+        self, task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion
+    ) -> QuickMotion:
+        """Return `faster_motion`, and remember where it ends."""
+        found = _at_least_interval(start)
+        if found is not None:
+            self._ends.append(found[0])
+        return _faster(task, finder, found, best)
+
+    def settled(self, best: QuickMotion) -> bool:
+        """Return whether enough motions that differ have the best interval."""
+        apart: list[Plan] = []
+        for end in self._ends:
+            as_quick = end.dt <= (1 + SAME_END) * best.dt
+            if as_quick and all(_apart(end, other) >= SAME_VALLEY for other in apart):
+                apart.append(end)
+        return len(apart) >= ALIKE_BOUND
+
+
 def _by_beam(
-    task: Task, finder: CollisionFreeSearch, best: QuickMotion, factor: float, tried: list[Plan]
+    task: Task,
+    finder: CollisionFreeSearch,
+    best: QuickMotion,
+    factor: float,
+    tried: list[Plan],
+    seen: _Seen,
 ) -> Iterator[QuickMotion]:
     """Yield ever faster motions by a beam search at some times the speed of the best one.
 
@@ -164,7 +198,7 @@ def _by_beam(
         made = ahead.plan_between(between, _claim())
         if not any(alike(made, other) for other in tried):
             tried.append(made)
-            faster = faster_motion(task, finder, made, best)
+            faster = seen.faster(task, finder, made, best)
             if faster is not best:
                 best = faster
                 yield best
@@ -176,7 +210,7 @@ def _through_valleys(
     best: QuickMotion,
     *,
     factor: float,
-    known: list[Course],
+    seen: _Seen,
     enough: float = np.inf,
 ) -> Iterator[QuickMotion]:
     """Yield ever faster motions through all valleys at some times the speed of the best one.
@@ -186,11 +220,11 @@ def _through_valleys(
     ahead = _at(task, best.dt / factor)
     courses = Courses(ahead, aim="interval")
     screened = courses.screened(courses.all(), QUICK)
-    yield from _quickened(ahead, finder, screened, best, known, enough)
+    yield from _quickened(ahead, finder, screened, best, seen, enough)
 
 
 def _shaken(
-    task: Task, finder: CollisionFreeSearch, best: QuickMotion, known: list[Course]
+    task: Task, finder: CollisionFreeSearch, best: QuickMotion, seen: _Seen
 ) -> Iterator[QuickMotion]:
     """Yield ever faster motions from the best one, changed at random."""
     shaken, screened = None, list[tuple[float, Course]]()
@@ -199,7 +233,7 @@ def _shaken(
             shaken, ahead = best, _at(task, best.dt / FACTORS[0])
             courses = Courses(ahead, aim="interval")
             screened = courses.screened(courses.shaken([best.plan]), QUICK)
-        for found in _quickened(ahead, finder, screened, best, known):
+        for found in _quickened(ahead, finder, screened, best, seen):
             best = found
             yield best
 
@@ -209,20 +243,20 @@ def _quickened(
     finder: CollisionFreeSearch,
     screened: list[tuple[float, Course]],
     best: QuickMotion,
-    known: list[Course],
+    seen: _Seen,
     enough: float = np.inf,
 ) -> Iterator[QuickMotion]:
     """Yield ever faster motions from the best screened ones that are not known."""
     tried = 0
     for needed, course in screened:
         most = QUICKENED if best.dt <= enough else FEW
-        if tried >= most or needed * ahead.dt > HOPELESS * best.dt:
+        if tried >= most or needed * ahead.dt > HOPELESS * best.dt or seen.settled(best):
             break
-        if any(course.like(other, SAME_VALLEY) for other in known):
+        if any(course.like(other, SAME_VALLEY) for other in seen.courses):
             continue
         tried += 1
-        known.append(course)
-        faster = faster_motion(ahead, finder, ahead.plan_at(*course, _claim()), best)
+        seen.courses.append(course)
+        faster = seen.faster(ahead, finder, ahead.plan_at(*course, _claim()), best)
         if faster is not best:
             best = faster
             yield best
@@ -284,7 +318,16 @@ def faster_motion(
     task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion
 ) -> QuickMotion:
     """Return the better of the best motion so far and a start with its interval minimised."""
-    found = _at_least_interval(start)
+    return _faster(task, finder, _at_least_interval(start), best)
+
+
+def _faster(
+    task: Task,
+    finder: CollisionFreeSearch,
+    found: tuple[Plan, Binding] | None,
+    best: QuickMotion,
+) -> QuickMotion:
+    """Return the better of the best motion so far and a found one, if there is one."""
     if found is None or found[0].dt >= best.dt or not _allowed(task, finder, found[0]):
         return best
     return replace(best, plan=found[0], at=found[1])
@@ -342,5 +385,9 @@ def clear_paths(
 
 def alike(made: Plan, other: Plan) -> bool:
     """Return whether two motions are so similar that they are refined to the same one."""
-    apart = np.abs(wrap(made.gamma - other.gamma)).max()
-    return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))
+    return _apart(made, other) < SAME_VALLEY and np.array_equal(made.posture, other.posture)
+
+
+def _apart(made: Plan, other: Plan) -> float:
+    """Return the largest difference of gamma of two motions, rad."""
+    return float(np.abs(wrap(made.gamma - other.gamma)).max())
