@@ -228,6 +228,25 @@ def test_a_small_circle_is_slower_by_the_lag_of_the_joints(tmp_path):
     assert set(speeds.values()) == {3.0}
 
 
+def test_a_job_of_some_of_many_holes_says_how_to_take_all(tmp_path):
+    path, job = tmp_path / "plate.dxf", tmp_path / "plate.toml"
+    drawing = ezdxf.new(units=4)
+    drawing.modelspace().add_lwpolyline([(0, 0), (200, 0), (200, 90), (0, 90)], close=True)
+    for k in range(7):
+        drawing.modelspace().add_circle((20 + 25 * k, 30), 8)
+    drawing.saveas(path)
+    assert "pick_all" not in job_text(read(path), job)  # eight loops: all are in it
+    drawing.modelspace().add_circle((20, 60), 6)
+    drawing.saveas(path)
+    text = job_text(read(path), job)
+    assert "pick_all" in text
+    instead = '[contour.pick_all]\nkind = "inner"'
+    table = "[[contour]]\nspeed_m_min = 2\nspacing_mm = 1.6\n" + instead
+    head = text[: text.index("[[contour]]")]
+    job.write_text(head + table)
+    assert len(prepare(read_job(job)).contours) == 8
+
+
 def test_a_loop_all_the_way_round_comes_with_the_lines_of_a_rotary_axis(tmp_path):
     """They are comments, as there may be none; without the signs the job is read and checked."""
     path = tmp_path / "tube.step"

@@ -66,8 +66,10 @@ file = {name}
 {reading}xyz_mm = {xyz}   # guess: where the part's origin is in the robot base
 rpy_deg = {rpy}              # guess: how the part is turned there; the beam comes from above
 
-# {cut} at a guessed speed; `kerfpath contours {drawing}` lists them all.
+# {cut} at a guessed speed; `kerfpath contours {drawing}` lists them all.{more}
 """
+MORE = """
+# A table [contour.pick_all] with kind = "inner", instead of pick, takes all holes at once."""
 ROUND = """\
 # The beam goes all the way round {loop}. Where the arm alone cannot, a rotary axis that carries
 # the part can (without the signs #):
@@ -160,6 +162,7 @@ def job_text(
         rpy=list(rpy),
         cut=_below([loop for loop in longest if level and loop not in level])
         + _cut(part, chosen, lines if main is not lines else ()),
+        more=MORE if len(main) > len(longest) or len(level or longest) > MOST_LOOPS else "",
     )
     tail = TAIL.format(
         feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
