@@ -51,6 +51,7 @@ NAMES = (
     "certificate_audits",
     "studio",
     "studio-endurance",
+    "compas",
 )
 
 
@@ -109,6 +110,10 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "compas":
+        from benchmarks import compas
+
+        return compas.run(quick=quick)
     if name == "first_runs":
         from benchmarks import first_runs
 

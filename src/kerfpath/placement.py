@@ -13,10 +13,10 @@ from kerfpath.arrays import Array, as_pose, floats, freeze, scalar, short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.metric import turns_of
 from kerfpath.planner import plan as plan_contour
-from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.plans import Plan, Proof, TransferMove, path_cost
 from kerfpath.refiner import refine
 from kerfpath.robots import base_in_part, posture_name
-from kerfpath.transfer import TransferMove, back_off, transfer_move
+from kerfpath.transfer import back_off, transfer_move
 
 __all__ = [
     "MeasuredFrame",

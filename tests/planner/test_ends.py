@@ -220,3 +220,14 @@ def test_plan_json_keeps_the_moves(ask, arm, tool, tmp_path):
         np.testing.assert_array_equal(own.q, back.q)
         np.testing.assert_array_equal(own.time, back.time)
     assert audit(read).passed
+
+
+def test_external_axes_come_along(ask, arm):
+    railed = arm.on_rail([0, 1, 0], lower=-1.0, upper=1.2, velocity=0.8, acceleration=1.5)
+    start = np.append(HOME, -0.8)
+    made = ask(railed, start_q=start, external=np.zeros((11, 1)), feed="dip")
+    np.testing.assert_array_equal(made.approach.q[0], start)
+    np.testing.assert_allclose(made.approach.q[-1], made.q[0], atol=1e-12)
+    assert audit(made).passed
+    with pytest.raises(InputError, match="start_q: expected rail from -1000 mm to 1200 mm, got 13"):
+        ask(railed, start_q=np.append(HOME, 1.3))

@@ -577,3 +577,13 @@ def test_valleys_of_many_contours_are_explored_where_more_may_be_saved():
         with effort_for(count):
             assert current_effort().worth_exploring == worth
     assert current_effort().worth_exploring == usual
+
+
+def test_the_former_home_of_transfer_moves_warns():
+    from kerfpath import transfer
+    from kerfpath.plans import TransferMove
+
+    with pytest.warns(DeprecationWarning, match="now kerfpath.plans.TransferMove"):
+        assert transfer.TransferMove is TransferMove
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = transfer.nothing

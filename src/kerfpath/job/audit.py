@@ -78,7 +78,7 @@ from kerfpath.job.program_file import (
     read_cuts,
 )
 from kerfpath.options import EXACT_OR_BETTER
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan, Proof, TransferMove
 from kerfpath.post import (
     CircularMove,
     Controller,
@@ -91,7 +91,7 @@ from kerfpath.post import (
 )
 from kerfpath.robots import Robot
 from kerfpath.tolerances import SAME_POINT
-from kerfpath.transfer import End, TransferMove, back_off, least_times
+from kerfpath.transfer import End, back_off, least_times
 
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.

@@ -17,7 +17,7 @@ from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file import PlanFile
 from kerfpath.job.program_file import ReadCut, branch_of, follow_poses
 from kerfpath.options import PlanOptions
-from kerfpath.plans import Plan, path_cost
+from kerfpath.plans import Plan, TransferMove, path_cost
 from kerfpath.post import (
     ZONE_STEP,
     CircularMove,
@@ -35,7 +35,7 @@ from kerfpath.retime import feed, retime
 from kerfpath.robots import Robot
 from kerfpath.sequence import Order, PartPlan
 from kerfpath.tolerances import SAME_PLACE
-from kerfpath.transfer import TransferMove, back_off, least_times
+from kerfpath.transfer import back_off, least_times
 from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------

@@ -46,13 +46,12 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.job.format import AuditTable, ProgramTable, Tolerances, contours_of, sheet_of
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
-from kerfpath.plans import Feed, Plan, Proof
+from kerfpath.plans import Feed, Plan, Proof, TransferMove
 from kerfpath.post import ProgramOptions, require_one_set
 from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
 from kerfpath.setting import settings
 from kerfpath.text import NOT_TEXT, named
-from kerfpath.transfer import TransferMove
 from kerfpath.urdf import ChainInertia, KinematicChain
 
 # -----------------------------------------------------------------------------

@@ -35,10 +35,9 @@ from kerfpath.job.format import (
 from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.run import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.post import ProgramIssue, ProgramOptions, build_program, dry_run, post_and_read
 from kerfpath.post import language as find_language
-from kerfpath.transfer import TransferMove
 
 # -----------------------------------------------------------------------------
 # Write the program of plans as text, read it back, and audit it before it is returned.

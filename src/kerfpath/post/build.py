@@ -13,7 +13,7 @@ from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.names import identifier, identifiers
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.post.arcs import euler, from_euler, with_arcs, zones_at
 from kerfpath.post.checks import LOWEST_SHARE
 from kerfpath.post.options import ProgramKeywords, ProgramOptions
@@ -33,7 +33,7 @@ from kerfpath.post.program import (
 )
 from kerfpath.post.thinning import Thinning
 from kerfpath.robots import ExternalAxis, Robot, carried, posture_name
-from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_share
+from kerfpath.transfer import End, back_off, least_time, speed_share
 
 # -----------------------------------------------------------------------------
 # External axes in programs: their values in the controller's units, and their set-up.

@@ -1,6 +1,7 @@
 """Transfer moves: straight joint motions where they are clear, otherwise around obstacles."""
 
-from kerfpath.plans import TransferMove as TransferMove
+import warnings
+
 from kerfpath.transfer.choice import HOME as HOME
 from kerfpath.transfer.choice import PATIENCE as PATIENCE
 from kerfpath.transfer.choice import MoveTimes as MoveTimes
@@ -18,3 +19,16 @@ from kerfpath.transfer.move import speed_share as speed_share
 from kerfpath.transfer.move import transfer_move as transfer_move
 from kerfpath.transfer.turns import on_near_turns as on_near_turns
 from kerfpath.transfer.turns import on_nearest_turns as on_nearest_turns
+
+
+def __getattr__(name: str) -> object:
+    if name != "TransferMove":
+        raise AttributeError(f"module 'kerfpath.transfer' has no attribute {name!r}")
+    from kerfpath.plans import TransferMove
+
+    warnings.warn(
+        "kerfpath.transfer.TransferMove is now kerfpath.plans.TransferMove",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    return TransferMove

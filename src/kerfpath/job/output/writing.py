@@ -30,7 +30,7 @@ from kerfpath.job.plan_file import (
 )
 from kerfpath.job.programs import expected_of_cuts, program_of
 from kerfpath.job.run import CutResult, JobResult, sides_in_doubt
-from kerfpath.plans import Plan, joint_columns
+from kerfpath.plans import Plan, TransferMove, joint_columns
 from kerfpath.post import (
     MANIFEST,
     Line,
@@ -47,7 +47,6 @@ from kerfpath.post import (
 from kerfpath.report import ContourSection, ExecutedPath, PowerPath, render
 from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
-from kerfpath.transfer import TransferMove
 
 # -----------------------------------------------------------------------------
 # Lines of a run's program: when each line runs, and what the preflight finds at it.

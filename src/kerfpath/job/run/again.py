@@ -13,10 +13,9 @@ from kerfpath.job.run.contour import advised, audited, plan_candidate
 from kerfpath.job.run.job import finished
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import turned
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.progress import Progress
 from kerfpath.sequence import on_turns_of, rejoined
-from kerfpath.transfer import TransferMove
 
 
 def run_again(

@@ -19,9 +19,8 @@ from kerfpath.planner import (
     ClearanceMap,
     FastestSpeed,
 )
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, TransferMove
 from kerfpath.sequence import PartPlan
-from kerfpath.transfer import TransferMove
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
