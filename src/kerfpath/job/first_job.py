@@ -89,11 +89,14 @@ UNIT = """\
 # mechanical_units = ["STN1"]  # guess
 """
 """Lines for a loop all the way round, such as the end of a tube, and those that RAPID needs."""
+SEQUENCE = """
+[sequence]                  # one order with the moves between the contours, for the least time
+"""
 TAIL = """\
 [plan]
 gamma_step_deg = 2          # step of the free rotation about the beam
 {feed:<28}# slow down where the joints need it, as in bends
-
+{sequence}
 # Without a [cell] nothing is checked for collisions. These lines check robot, head and part:
 # [cell]
 # near_miss_mm = 5
@@ -166,6 +169,7 @@ def job_text(
     )
     tail = TAIL.format(
         feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
+        sequence=SEQUENCE if chosen[1:] else "",
         language=language,
     )
     contours = (
