@@ -50,8 +50,7 @@ class Effort:
         Most steps between cells in one round, and most pairs of steps in all, before a proof that
         no motion exists ends undecided.
     infeasibility_tubes : int
-        Most tubes into which motions are divided in such a proof, around a node and along the whole
-        contour.
+        Most tubes into which motions are divided in such a proof.
     binding_nodes : int
         Most nodes around which a speed is tested for being impossible.
     speed_factors : tuple of float
@@ -77,7 +76,7 @@ class Effort:
     minimax_pairs: int = 3_000_000
     infeasibility_steps: int = 2_000_000
     infeasibility_pairs: int = 30_000_000
-    infeasibility_tubes: int = 300
+    infeasibility_tubes: int = 400
     binding_nodes: int = 12
     speed_factors: tuple[float, ...] = (1.06, 1.0, 1.1)
     exact_edges: int = 20_000_000

@@ -6,8 +6,10 @@ import pytest
 from kerfpath import fastest_speed, plan
 from kerfpath.certifier import MotionTest, empty_tubes, infeasibility
 from kerfpath.certifier.cells import CellMaker
-from kerfpath.certifier.empty_tubes import EmptyTubes
+from kerfpath.certifier.empty_tubes import EmptyTubes, binding_window
+from kerfpath.certifier.neighbours import within
 from kerfpath.certifier.stages import Steps
+from kerfpath.certifier.tube import Duals, enclosed, hull
 from kerfpath.contour import Contour
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.limits import Limits
@@ -74,16 +76,31 @@ def test_slightly_above_the_fastest_speed_it_is_proved(first, quickest):
     assert 0 <= closed.node < NODES - 1
 
 
-def tubes_of(one, dt):
+def steps_of(one, dt):
     limits = one.settings.limits(one.robot)
-    steps = Steps(
+    return Steps(
         weight=np.zeros(6), velocity=limits.velocity.per_interval(dt),
         acceleration=limits.acceleration.most_per_interval(dt), metric=MANHATTAN,
         endless=one.robot.endless,
     )  # fmt: skip
-    maker = CellMaker(one.robot, one.nominal_frames, one.T_flange_tip)
+
+
+def program_of(one, dt):
     nodes = np.arange(len(one.q))
-    return maker, steps, EmptyTubes(maker, steps, nodes, 1)
+    return EmptyTubes(maker_of(one), steps_of(one, dt), len(one.q) - 1, 1).program(nodes)
+
+
+def maker_of(one):
+    return CellMaker(one.robot, one.nominal_frames, one.T_flange_tip)
+
+
+def tube_near(one, width, halved):
+    """Return a tube about a motion, and its cells."""
+    maker, nodes = maker_of(one), np.arange(len(one.q))
+    cells = cells_near(maker, one, width, halved)
+    tube = enclosed(maker, one.robot.endless, nodes, cells, hull(cells, nodes))
+    assert tube is not None
+    return tube, cells
 
 
 def cells_near(maker, one, width, halved):
@@ -98,11 +115,8 @@ def cells_near(maker, one, width, halved):
 
 @pytest.mark.parametrize(("width", "halved"), [(0.3, 2), (0.1, 3), (0.02, 5)])
 def test_the_curves_of_a_tube_hold_the_joints_on_its_cells(width, halved, quickest):
-    one = quickest(0)
-    maker, _, tubes = tubes_of(one, one.dt)
-    cells = cells_near(maker, one, width, halved)
-    tube, rng = tubes._tube(cells), np.random.default_rng(8)
-    assert tube is not None
+    one, rng = quickest(0), np.random.default_rng(8)
+    (tube, cells), maker = tube_near(one, width, halved), maker_of(one)
     for k in range(len(one.q)):
         mine = cells.take(cells.node == k)
         which = rng.integers(len(mine), size=40)
@@ -110,29 +124,106 @@ def test_the_curves_of_a_tube_hold_the_joints_on_its_cells(width, halved, quicke
         q, _, reached = maker.joints(np.full(40, k), gamma, int(one.posture[k]))
         assert reached.all()
         t = np.angle(np.exp(1j * (gamma - tube.middle[k])))[:, None]
-        off = q - (tube.center[k] + tube.slope[k] * t + tube.bend[k] * t**2 / 2)
+        off = q - (t ** np.arange(4)) @ tube.power[k]
         off -= 2 * np.pi * np.rint(off / (2 * np.pi))
         assert (np.abs(off) <= tube.spread[k] + 1e-12).all()
 
 
+@pytest.mark.parametrize("strides", [(1, 1, 1, 1, 1, 1, 1, 1), (2, 1, 2, 2, 1)])
+@pytest.mark.parametrize(("width", "halved"), [(0.3, 2), (0.02, 5)])
+def test_what_is_tied_holds_for_every_motion_within_the_limits(width, halved, strides, quickest):
+    """Motions wander within the tube; the limits are what each of them uses, to the last digit."""
+    one, rng = quickest(0), np.random.default_rng(12)
+    tube, cells = tube_near(one, width, halved)
+    maker, nodes = maker_of(one), np.append(0, np.cumsum(strides))
+    cells = cells.take(np.isin(cells.node, nodes))
+    tube = enclosed(maker, one.robot.endless, nodes, cells, hull(cells, nodes))
+    spans, narrower = np.array(strides), 0
+    for size in (0.0, 0.01, 0.1, 1.0):
+        for _ in range(5):
+            level, slope = rng.uniform(-1, 1, 2)
+            t = 0.5 * level + 0.4 * slope * np.linspace(-1, 1, len(nodes))
+            t = np.clip(t + 0.1 * size * rng.normal(size=len(nodes)), -1, 1) * tube.half
+            q, _, reached = maker.joints(nodes, tube.middle + t, int(one.posture[0]))
+            assert reached.all()
+            u = np.diff(q, axis=0)
+            u = (u - 2 * np.pi * np.rint(u / (2 * np.pi))) / spans[:, None]
+            bent = np.diff(u, axis=0) / ((spans[1:] + spans[:-1]) / 2)[:, None]
+            steps = Steps(
+                weight=np.zeros(6), velocity=np.abs(u).max(axis=0),
+                acceleration=np.abs(bent).max(axis=0), metric=MANHATTAN, endless=one.robot.endless,
+            )  # fmt: skip
+            tied, _ = tube.with_ties(steps, spans)
+            assert tied is not None
+            least, most, bend_least, bend_most = tied.changes
+            d = np.diff(t)
+            e = d[1:] / spans[1:] - d[:-1] / spans[:-1]
+            room = 1e-12
+            assert (least - room <= d).all()
+            assert (d <= most + room).all()
+            assert (bend_least - room <= e).all()
+            assert (e <= bend_most + room).all()
+            low, high = within(tied.changes, tied.half)
+            assert (low <= t).all()
+            assert (t <= high).all()
+            rows, bound = tied.tied
+            powers = np.concatenate([t / tube.half, (t / tube.half) ** 2])
+            assert (rows @ powers <= bound + room).all()
+            narrower += (most - least < 0.7 * (tube.half[1:] + tube.half[:-1])).sum()
+    assert narrower > 20  # else nothing is tied
+
+
 def test_no_duals_prove_a_tube_with_a_motion_empty(quickest):
     """Whatever the duals: those of its program at a higher speed, and changed at random."""
-    one = quickest(0)
-    maker, steps, tubes = tubes_of(one, one.dt * 1.0001)
-    cells = cells_near(maker, one, 0.02, 5)
-    tube, spans = tubes._tube(cells), np.ones(len(one.q) - 1, np.int64)
+    one, spans = quickest(0), np.ones(NODES - 1, np.int64)
+    steps = steps_of(one, one.dt * 1.0001)
+    tube, _ = tube_near(one, 0.02, 5)
+    tube, _ = tube.with_ties(steps, spans)
     rng = np.random.default_rng(9)
     for faster in (1.0, 1.02, 1.2):
-        _, quick, other = tubes_of(one, one.dt / faster)
-        y, nu, _ = other._program.solve(tube)
-        assert tube.least(steps, spans, y, nu) <= 0
-        if faster == 1.2:
-            assert tube.least(quick, spans, y, nu) > 0  # at that speed it is empty
+        duals, _ = program_of(one, one.dt / faster).solve(tube)
+        assert tube.least(steps, spans, duals) <= 0
+        if faster == 1.2:  # at that speed it is empty
+            assert tube.least(steps_of(one, one.dt / faster), spans, duals) > 0
         for size in (0.01, 0.1, 1.0):
-            y1 = y + size * np.abs(y).max() * rng.normal(size=y.shape)
-            nu1 = nu + size * np.abs(nu).max() * rng.normal(size=nu.shape)
-            nu1[[0, -1]] = 0.0
-            assert tube.least(steps, spans, y1, nu1) <= 0
+            y, nu, ties = (
+                each + size * np.abs(each).max() * rng.normal(size=each.shape) for each in duals
+            )
+            nu[[0, -1]] = 0.0
+            assert tube.least(steps, spans, Duals(y, nu, ties)) <= 0
+
+
+@pytest.mark.parametrize("slower", [1 / 1.2, 1.05])
+def test_a_part_that_motions_pass_grows_to_one_that_none_passes_or_to_a_motion(slower, quickest):
+    """From four nodes, along which much is possible."""
+    one = quickest(0)
+    maker, steps = maker_of(one), steps_of(one, one.dt * slower)
+    cells, nodes = cells_near(maker, one, 0.2, 2), np.arange(3, 7)
+    tubes = EmptyTubes(maker, steps, NODES - 1, 100)
+    closed = tubes.closed(cells.take(np.isin(cells.node, nodes)), nodes)
+    if slower < 1:
+        assert closed is not None
+        assert tubes.motion is None
+        return
+    assert closed is None
+    gamma, posture = tubes.motion
+    q, _, reached = maker.joints(np.arange(NODES), gamma, posture)
+    u = np.diff(q, axis=0)
+    u -= 2 * np.pi * np.rint(u / (2 * np.pi))
+    assert reached.all()
+    assert (np.abs(u) <= steps.velocity).all()
+    assert (np.abs(np.diff(u, axis=0)) <= steps.acceleration).all()
+
+
+def test_limits_bind_where_a_motion_cannot_be_bettered(quickest):
+    """The window holds the node that binds, and grows to no more than the contour."""
+    one = quickest(0)
+    used = np.abs(one.acceleration_share).max(axis=1)
+    first, last = binding_window(
+        maker_of(one), steps_of(one, one.dt / 1.02), one.gamma, one.posture.astype(np.int64)
+    )
+    assert 0 <= first < last < NODES
+    assert (used[max(first - 1, 0) : last] > 0.999).any()
 
 
 @pytest.mark.usefixtures("at_once")

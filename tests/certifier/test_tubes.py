@@ -11,6 +11,7 @@ from kerfpath.certificate import LEAST_GAP
 from kerfpath.certifier import bound as proving
 from kerfpath.certifier import certify
 from kerfpath.certifier.cells import cell_maker
+from kerfpath.certifier.tube import Duals
 from kerfpath.certifier.tubes import Tubes
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
@@ -60,6 +61,7 @@ def tube_about(one, width):
     shift = rng.uniform(-width, width, (2, len(one.q)))
     low, high = one.gamma - np.abs(shift[0]), one.gamma + np.abs(shift[1])
     tube = made._tube(cells.take(off <= cells.half), low, high)
+    tube, _ = tube.with_ties(steps, made._program.spans)
     return made, tube, steps
 
 
@@ -71,14 +73,16 @@ def test_no_duals_bound_a_motion_in_the_tube_too_high(metric, short):
     found = made._program.solve(tube)
     assert found.solved
     spans, rng = np.ones(len(one.q) - 1, np.int64), np.random.default_rng(5)
-    own = tube.least(steps, spans, found.y, found.nu)
+    own = tube.least(steps, spans, found.duals)
     assert 0.8 * one.cost < own <= one.cost  # (6) binds in a tube as narrow
     for size in (0.01, 0.1, 1.0, 10.0):
         for _ in range(20):
-            y = found.y + size * rng.normal(size=found.y.shape) * steps.weight
-            nu = found.nu + size * rng.normal(size=found.nu.shape) * steps.weight
+            y, nu, ties = found.duals
+            y = y + size * rng.normal(size=y.shape) * steps.weight
+            nu = nu + size * rng.normal(size=nu.shape) * steps.weight
             nu[[0, -1]] = 0.0
-            assert tube.least(steps, spans, y, nu) <= one.cost
+            ties = ties + size * rng.normal(size=ties.shape)
+            assert tube.least(steps, spans, Duals(y, nu, ties)) <= one.cost
 
 
 def test_the_bound_of_a_tube_closes_with_the_square_of_its_width(short):
@@ -86,7 +90,7 @@ def test_the_bound_of_a_tube_closes_with_the_square_of_its_width(short):
     for width in (0.02, 0.005):
         made, tube, steps = tube_about(one, width)
         found = made._program.solve(tube)
-        own = tube.least(steps, made._program.spans, found.y, found.nu)
+        own = tube.least(steps, made._program.spans, found.duals)
         lack.append(one.cost - own)
     assert lack[1] < lack[0] / 8  # 16 if nothing but the square counted
 
@@ -99,8 +103,8 @@ def test_a_tube_without_a_motion_is_proved_to_have_none(short):
     apart = replace(tube, center=tube.center + moved[:, None])
     found = made._program.solve(apart)
     assert not found.solved
-    assert apart.least(made._free, made._program.spans, found.y, found.nu) > 0
-    assert tube.least(made._free, made._program.spans, found.y, found.nu) <= 0
+    assert apart.least(made._free, made._program.spans, found.duals) > 0
+    assert tube.least(made._free, made._program.spans, found.duals) <= 0
 
 
 def least_on_grid(one, width, step):

@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.elimination import Elimination
-from kerfpath.certifier.empty_tubes import EmptyTubes
+from kerfpath.certifier.empty_tubes import EmptyTubes, binding_window
 from kerfpath.certifier.stages import Steps
 from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
@@ -29,8 +29,9 @@ MOST_CELLS = 2_000
 STALLED, FROM_HALVING = 0.2, 3
 """Share of the halves that a round of a brief test must rule out, from which halving on: rounds
 that end in a proof rule out more, and those of other tests less and less."""
-MANY_STEPS = 100_000
-"""Steps between cells above which motions are divided into tubes rather than cells into halves."""
+MANY_STEPS, MANY_HALVINGS = 100_000, 4
+"""Steps between cells above which motions are divided into tubes rather than cells into halves, and
+the number of halvings from which on they are."""
 
 
 def closed_node(
@@ -91,6 +92,7 @@ class MotionTest:
         *,
         brief: bool = False,
         tubes: int = 0,
+        binding: tuple[Array, Ints] | None = None,
     ) -> Closed | None:
         """Return the place that no motion passes, with nodes `dt` s apart; None if not proved.
 
@@ -101,7 +103,9 @@ class MotionTest:
         the whole contour. More than `MOST_NODES` nodes are not tested as a whole. Cells are at some
         nodes only where joints take many intervals to reach their velocity limit (`Steps.layers`).
         With `brief`, it ends as soon as halving rules out little. With ``tubes``, motions are
-        divided into at most so many (`EmptyTubes`), once finer cells have too many steps.
+        divided into at most so many (`EmptyTubes`), once finer cells have too many steps; the part
+        then grows to more nodes where motions pass it. With ``binding``, gamma and posture (K,) of
+        a motion that exceeds the limits, it begins with the part where limits bind this motion.
         """
         steps = Steps(
             weight=freeze(np.zeros(len(self._endless))),
@@ -115,6 +119,9 @@ class MotionTest:
         if around is not None:
             near = NODES_AROUND * int(np.diff(steps.layers(first, last)).max(initial=1))
             first, last = max(first, around - near), min(last, around + near)
+        window = None if binding is None else binding_window(self._maker, steps, *binding)
+        if window is not None:
+            first, last = window
         if last - first >= MOST_NODES:
             return None
         nodes, work = np.arange(first, last + 1), 0
@@ -138,11 +145,10 @@ class MotionTest:
             passed, before = one.cells.take(one.backward()), len(one.cells)
             if brief and halved >= FROM_HALVING - 1 and len(passed) > (1 - STALLED) * before:
                 return None
-            if tubes and len(nodes) > 2 and one.number > MANY_STEPS:
-                layer = EmptyTubes(self._maker, steps, nodes, tubes).closed(passed)
-                if layer is None:
-                    return None
-                return Closed(node=int(nodes[layer]) - 1, joint=None, limit="both")
+            many = one.number > MANY_STEPS or halved >= MANY_HALVINGS
+            if tubes and len(nodes) > 2 and many:
+                node = EmptyTubes(self._maker, steps, self._count - 1, tubes).closed(passed, nodes)
+                return None if node is None else Closed(node=node - 1, joint=None, limit="both")
             cells = self._maker.halves(passed)
         return None
 

@@ -1,17 +1,19 @@
 """Branch and bound over tubes: motions whose gamma stays in one interval at each node.
 
 Three bounds hold for the motions of a tube. The first is a linear (or second-order cone) program in
-the squares, too: with q_k = c_k + s_k t + b_k t^2 / 2 +- r_k on the interval of node k, the pair
-(t, t^2) is replaced by (t, w) in the convex hull of the parabola, so that (5), (6) and the cost
-become convex. Its duals y of the increments and nu of (6) give a bound that is proved by itself,
-whatever they are (`Tube.least`): a sum of minima of one quadratic function at each node. The other
-two are stages on the cells of the tube, with nu of the whole tube and of its part around the motion
-that the program found; they rule out cells. The joints on an interval of half-width h differ from
-the convex hull by no more than a multiple of h^2, so that the first bound closes as tubes get
-narrower. Where a program has no solution, its duals prove that the tube has no motion.
+the powers of gamma, too: with q_k = c_k + s_k t + b_k t^2 / 2 + g_k t^3 / 6 +- r_k on the interval
+of node k, the powers (t, t^2, t^3) are replaced by (t, w, z) in a convex set that holds them, so
+that (5), (6) and the cost become convex; what the squares of neighbouring nodes differ is tied to
+the changes of gamma (`kerfpath.certifier.neighbours`). Its duals y of the increments, nu of (6) and
+of what is tied give a bound that is proved by itself, whatever they are (`Tube.least`): a sum of
+minima of one cubic at each node. The other two are stages on the cells of the tube, with nu of the
+whole tube and of its part around the motion that the program found; they rule out cells. The joints
+on an interval of half-width h differ from the convex set by no more than a multiple of h^2, so that
+the first bound closes as tubes get narrower. Where a program has no solution, its duals prove that
+the tube has no motion.
 
-The tube with the lowest bound is divided first: at the node where the program is the farthest from
-the parabola.
+The tube with the lowest bound is divided first: at the node where the duals feel the powers of
+gamma most, compared with its width.
 """
 
 from __future__ import annotations
@@ -27,13 +29,13 @@ from scipy import sparse
 
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.certificate import cell_bounds
-from kerfpath.certifier.cells import FREE, TURN, CellMaker, CellSet
+from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.multipliers import Lengths
 from kerfpath.certifier.parts import CARE, SAME_COST
-from kerfpath.certifier.stages import ROUNDED, StageResult, Steps, solve_stage
-from kerfpath.conic import ConicSolution, NonnegativeConeT, minimise
+from kerfpath.certifier.stages import StageResult, Steps, solve_stage
+from kerfpath.certifier.tube import Duals, Tube, TubeRows, enclosed, hull
+from kerfpath.conic import NonnegativeConeT, minimise
 from kerfpath.kernels.metric import MANHATTAN
-from kerfpath.kernels.reduced import excess
 from kerfpath.search import Course
 
 ACROSS = 16
@@ -45,142 +47,26 @@ WIDEST = 0.5
 TRUST, WIDER, TIMES = 0.017, 2.0, 5
 """rad: how far from the motion of the program its part goes for which multipliers are made; and the
 factor by which it is widened, and how often, where it has no motion."""
-TANGENTS = -1.0, -0.6, -0.25, 0.25, 0.6, 1.0
-"""Where on the parabola, in half-widths, the squares are held from below."""
 AGAIN, ROUNDS = 0.8, 4
 """Share of its cells that a tube must lose to be bounded again, undivided, and how often."""
 NEARLY = 1.02
 """Most of the limits that a motion of a program may need to be refined."""
 PROGRAM_PAIRS = 400
 """Number of steps from cell to cell that take as long as a program, for each of its nodes."""
-UNIT = 2.0**-52
-"""Relative spacing of floating-point numbers."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tube:
-    """Curves of the joints on one interval of gamma at each of M layers.
-
-    Parameters
-    ----------
-    middle, half : (M,) rad
-    center, slope, bend, spread : (M, n)
-        As in `CellSet`; the increments are those of the centres.
-    """
-
-    middle: Array
-    half: Array
-    center: Array
-    slope: Array
-    bend: Array
-    spread: Array
-
-    __repr__ = short_repr
-
-    def least(self, steps: Steps, spans: Ints, y: Array, nu: Array) -> float:
-        """Return a lower bound on the cost of the motions of the tube, from any duals.
-
-        Parameters
-        ----------
-        steps : Steps
-        spans : (M - 1,)
-        y : (M - 1, n)
-            Slopes of the cost, tilt included, by the increments.
-        nu : (M, n)
-            Multipliers of (6).
-        """
-        over = sum(excess(y[k], steps.tilted(nu, spans, k)) for k in range(len(y)))
-        force = -np.diff(y, axis=0, prepend=0.0, append=0.0)
-        h, size = self.half, np.abs(force)
-        level = (force * self.center).sum(axis=1)
-        slope, bend = (force * self.slope).sum(axis=1), (force * self.bend).sum(axis=1)
-        ends = bend * h**2 / 2 - np.abs(slope) * h
-        inside = np.abs(slope) < bend * h
-        lowest = np.where(inside, -(slope**2) / (2 * np.where(inside, bend, 1.0)), ends)
-        price = steps.price(nu, spans)
-        total = float((level + lowest - (size * self.spread).sum(axis=1)).sum() - over - price)
-        sizes = np.abs(self.center) + np.abs(self.slope) * h[:, None]
-        sizes += np.abs(self.bend) * h[:, None] ** 2 + self.spread
-        rounded = 4 * UNIT * force.size * (float((size * sizes).sum()) + over + price)
-        return total - rounded
-
-    def pull(self, y: Array) -> Array:
-        """Return how much the squares of gamma matter at each layer (M,), with duals y."""
-        force = -np.diff(y, axis=0, prepend=0.0, append=0.0)
-        return np.asarray(np.abs((force * self.bend).sum(axis=1)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Found:
-    """What a program found: gamma (M,), squares less those of gamma (M,), and duals.
+    """What a program found: gamma (M,) and duals.
 
     Without a solution there are duals only, which may prove that there is none.
     """
 
     solved: bool
-    y: Array
-    nu: Array
+    duals: Duals
     gamma: Array
-    beyond: Array
 
     __repr__ = short_repr
-
-
-class TubeRows:
-    """What programs of tubes at given layers share: their variables, and the rows of a tube.
-
-    The variables are gamma in half-widths (M,), its squares (M,), the increments of the joints
-    (M - 1, n) in a row, and `more` of the program's own; `gamma`, `square`, `step` and `own` are
-    the rows of the identity that pick them. Rows come in pairs of a matrix and its largest values.
-    """
-
-    def __init__(self, steps: Steps, nodes: Ints, more: int) -> None:
-        self.spans = np.diff(nodes)
-        M, n = len(nodes), len(steps.velocity)
-        size = (M - 1) * n
-        self.shape, self.size, self.count = (M, n), size, 2 * M + size + more
-        eye = sparse.eye_array(self.count, format="csr")
-        self.gamma, self.square = eye[:M], eye[M : 2 * M]
-        self.step, self.own = eye[2 * M : 2 * M + size], eye[2 * M + size :]
-        each = np.repeat(self.spans.astype(float), n)
-        mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ self.step)
-        apart = (self.spans[:-1] + self.spans[1:]) / 2
-        self.bend = mean[n:] - mean[:-n], np.outer(apart, steps.acceleration).ravel()
-        velocity = [steps.over(int(m)).velocity for m in self.spans]
-        self.move = self.step, np.concatenate(velocity)
-        one, zero = np.ones(M), np.zeros(M)
-        t, w = self.gamma, self.square
-        self.box: list[tuple[Any, Array]] = [(t, one), (-t, one), (w, one), (-w, zero)]
-        self.tangents = [(2 * at * t - w, at * at * one) for at in TANGENTS]
-        k, i = np.divmod(np.arange(size), n)
-        self._place = np.tile(np.arange(size), 4), np.concatenate([k + 1, k, M + k + 1, M + k])
-        self._at = k, i
-
-    def of(self, tube: Tube) -> tuple[Any, Array]:
-        """Return the rows by which the increments are those of a tube, within its spread."""
-        k, i = self._at
-        linear, square = tube.slope * tube.half[:, None], tube.bend * tube.half[:, None] ** 2 / 2
-        values = [linear[k + 1, i], -linear[k, i], square[k + 1, i], -square[k, i]]
-        moved = sparse.csr_array((np.concatenate(values), self._place), (self.size, self.count))
-        link = moved - self.step
-        D, wide = np.diff(tube.center, axis=0).ravel(), (tube.spread[1:] + tube.spread[:-1]).ravel()
-        return sparse.vstack([link, -link]), np.concatenate([wide - D, wide + D])
-
-    def duals(self, found: Array) -> tuple[Array, Array]:
-        """Return the duals y (M - 1, n) of the increments and nu (M, n) of (6).
-
-        The rows of the program begin with those of a tube and of `bend`, both ways.
-        """
-        (M, n), size = self.shape, self.size
-        y = (found[:size] - found[size : 2 * size]).reshape(M - 1, n)
-        above = found[2 * size :][: 2 * (size - n)].reshape(2, M - 2, n)
-        return y, np.pad(above[0] - above[1], ((1, 1), (0, 0)))
-
-    def beyond(self, x: Array) -> tuple[Array, Array]:
-        """Return gamma in half-widths (M,), and its squares less the square of it (M,)."""
-        M, _ = self.shape
-        t, w = x[:M], x[M : 2 * M]
-        return t, np.maximum(w - t * t, 0.0)
 
 
 class _Program:
@@ -196,17 +82,17 @@ class _Program:
         moved = sparse.diags_array(np.tile(steps.weight, edges)) @ one.step
         (bent, change), (u, velocity) = one.bend, one.move
         pairs = [(bent, change), (-bent, change), (u, velocity), (-u, velocity)]
-        pairs += [*one.box, *one.tangents]
+        pairs += one.powers
         if manhattan:
             pairs += [(moved - one.own, np.zeros(size)), (-moved - one.own, np.zeros(size))]
         held = sum(len(bound) for _, bound in pairs)
-        self._cones = [NonnegativeConeT(2 * size + held)]
+        self._linear, self._cones = 2 * size + held, list[Any]()
         if not manhattan:
             longer, bound, cones = Lengths(moved, np.zeros(size), n, steps.metric).cones(
                 first, one.count
             )
             pairs.append((longer, bound))
-            self._cones += cones
+            self._cones = cones
         rows, right = zip(*pairs, strict=True)
         self._rows, self._right = sparse.csr_array(sparse.vstack(rows)), np.concatenate(right)
         self._cost = np.concatenate([np.zeros(first), np.ones(lengths)])
@@ -214,20 +100,17 @@ class _Program:
     def solve(self, tube: Tube) -> _Found | None:
         """Return what the program of a tube finds; None if the solver fails."""
         link, wide = self._of.of(tube)
-        found: ConicSolution = minimise(
-            self._cost, sparse.vstack([link, self._rows]), np.concatenate([wide, self._right]),
-            self._cones, threads=1,
-        )  # fmt: skip
+        tied = 0 if tube.tied is None else len(tube.tied[1])
+        cones = [NonnegativeConeT(self._linear + tied), *self._cones]
+        rows, right = sparse.vstack([link, self._rows]), np.concatenate([wide, self._right])
+        found = minimise(self._cost, rows, right, cones, threads=1)
         if not np.isfinite(found.dual).all():
             return None
-        y, nu = self._of.duals(found.dual)
-        t, beyond = self._of.beyond(found.x)
+        t = found.x[: len(tube.half)]
         return _Found(
             solved=found.solved and bool(np.isfinite(t).all()),
-            y=y,
-            nu=nu,
+            duals=self._of.duals(found.dual, tube),
             gamma=tube.middle + tube.half * np.clip(t, -1.0, 1.0),
-            beyond=beyond * tube.half**2,
         )
 
 
@@ -310,15 +193,18 @@ class Tubes:
         low, high = hull(cells, self._nodes)
         tube, found = self._tube(cells, low, high), None
         if tube is not None:
+            tube, _ = tube.with_ties(self._steps, self._program.spans)
+            if tube is None:
+                return  # no motion
             found = self._solved(tube)
         if tube is not None and found is not None:
             if not found.solved:
-                if tube.least(self._free, self._program.spans, found.y, found.nu) > 0:
+                if tube.least(self._free, self._program.spans, found.duals) > 0:
                     return
                 found = None
             else:
                 self._look_at(found.gamma, cells)
-                own = tube.least(self._steps, self._program.spans, found.y, found.nu)
+                own = tube.least(self._steps, self._program.spans, found.duals)
                 known = max(known, own)
                 if self._close(known):
                     return
@@ -392,43 +278,9 @@ class Tubes:
 
         None if they do not have certain increments: too wide, or in several postures or turns.
         """
-        half = (high - low) / 2 * (1 + ROUNDED) + ROUNDED * (1 + np.abs(low))
-        if half.max() > WIDEST:
+        if (high - low).max() > 2 * WIDEST:
             return None
-        layer = np.searchsorted(self._nodes, cells.node)
-        posture = np.zeros(len(self._nodes), np.int64)
-        posture[layer] = cells.posture
-        if (cells.posture != posture[layer]).any() or (cells.box > FREE).any():
-            return None
-        middle = (low + high) / 2
-        found = self._maker.curves(self._nodes, middle, half, posture)
-        if found is None:
-            return None
-        center, slope, bend, spread = found
-        box = np.abs(slope) * half[:, None] + np.abs(bend) * half[:, None] ** 2 / 2 + spread
-        if (box > FREE).any():
-            return None
-        ended = ~self._steps.endless
-        turn = np.rint((cells.center - center[layer]) / TURN)
-        own = np.zeros_like(center)
-        own[layer] = turn
-        if (turn != own[layer])[:, ended].any():
-            return None
-        center = center + TURN * np.where(ended, own, 0.0)
-        D = np.diff(center, axis=0)
-        short = TURN * np.rint(D / TURN)
-        wide = np.abs(D - short) + box[1:] + box[:-1]
-        if (wide > np.pi)[:, ~ended].any():
-            return None
-        center[1:] -= np.cumsum(np.where(ended, 0.0, short), axis=0)
-        return Tube(
-            middle=middle,
-            half=half,
-            center=center,
-            slope=slope,
-            bend=bend,
-            spread=spread + ROUNDED * (1 + np.abs(center)),
-        )
+        return enclosed(self._maker, self._steps.endless, self._nodes, cells, (low, high))
 
     def _solved(self, tube: Tube) -> _Found | None:
         self.pairs += PROGRAM_PAIRS * len(self._nodes)
@@ -448,6 +300,8 @@ class Tubes:
             part = self._tube(
                 cells, np.maximum(low, about - reach), np.minimum(high, about + reach)
             )
+            if part is not None:
+                part, _ = part.with_ties(self._steps, self._program.spans)
             near = None if part is None else self._solved(part)
             if near is not None and near.solved:
                 duals.insert(0, near)
@@ -455,7 +309,7 @@ class Tubes:
             reach *= WIDER
         results: list[StageResult] = []
         for each in duals:
-            results.append(self._stage(cells, each.nu, each.y))
+            results.append(self._stage(cells, each.duals.nu, each.duals.y))
             if results[-1].bound >= self._target:
                 break
         return results
@@ -486,8 +340,8 @@ class Tubes:
             return []
         score = (high - low) ** 2
         if tube is not None and found is not None:
-            pull = tube.pull(found.y)
-            score = score * (pull + 1e-3 * pull.max() + 1e-9)
+            pull = tube.pull(found.duals)
+            score = pull + 1e-3 * score * pull.max() / score.max() + 1e-12 * score
         k = int(np.argmax(np.where(several, score, -1.0)))
         return [cells.take((layer != k) | side) for side in (left, ~left)]
 
@@ -496,21 +350,3 @@ def _least(cells: CellSet) -> float:
     """Return the least floor of the cells of a node, at the node where it is largest."""
     begin = np.flatnonzero(np.diff(cells.node, prepend=-1))
     return float(np.minimum.reduceat(cells.floor, begin).max())
-
-
-def hull(cells: CellSet, nodes: Ints) -> tuple[Array, Array]:
-    """Return the ends (M,) of the shortest interval of gamma that holds the cells of each node."""
-    middle, half = cell_bounds(cells.level, cells.index)
-    order = np.lexsort((middle, cells.node))
-    low, high = np.empty((2, len(nodes)))
-    begin = np.searchsorted(cells.node[order], nodes)
-    last = 0.0
-    for k, which in enumerate(np.split(order, begin[1:])):
-        at, wide = middle[which], half[which]
-        gap = int(np.argmax(np.diff(at, append=at[0] + TURN))) + 1
-        at, wide = np.roll(at, -gap), np.roll(wide, -gap)
-        at = at[0] + np.mod(at - at[0], TURN)
-        turn = TURN * np.rint((last - at.mean()) / TURN)
-        low[k], high[k] = (at - wide).min() + turn, (at + wide).max() + turn
-        last = (low[k] + high[k]) / 2
-    return low, high

@@ -31,6 +31,9 @@ MUCH = 2.0
 none is quick enough: what is slower is advice enough."""
 MOST_PLACES = 4
 """Most binding nodes around which a proof is tried for one speed."""
+MOST_PARTS, FEW_TUBES = 2, 8
+"""Most binding nodes around which motions are divided into tubes, and the share of the most tubes
+that each such part takes: a proof that one of them gives ends early, and others take long."""
 FAR, CLOSE = 300.0, 1.02
 """Largest factor on the speed that is tried to find an impossible speed; and the factor to which
 the impossible speed is then narrowed down."""
@@ -55,7 +58,8 @@ def at_any_gamma(
     """Return the answer of a search without a path, with whether it is proved at every gamma.
 
     It is tried first around the nodes that bind `motions`, each quicker than the one before, where
-    it takes least work; and at last by dividing motions into tubes.
+    it takes least work; and at last by dividing motions into tubes, from where limits bind the
+    quickest of them.
     """
     test = motion_test(task)
     if test is None or task.settings.feed == "dip":
@@ -63,9 +67,18 @@ def at_any_gamma(
     limits = task.problem.limits
     nodes = binding_nodes(motions)[:MOST_PLACES] if motions else [broken.node + 1]
     tubes = current_effort().infeasibility_tubes
-    tried = [(around, 0) for around in (*nodes, None)] + [(nodes[0], tubes), (None, tubes)]
-    each = (test.closed(limits, task.dt, around, tubes=most) for around, most in tried)
+    each = (test.closed(limits, task.dt, around) for around in (*nodes, None))
     closed = next((found for found in each if found is not None), None)
+    if closed is None:
+        binding = (motions[-1].plan.gamma, motions[-1].plan.posture) if motions else None
+        few = max(tubes // FEW_TUBES, 1)
+        tried = [(nodes[0], binding, few), *((node, None, few) for node in nodes[:MOST_PARTS])]
+        tried.append((nodes[0], binding, tubes))
+        divided = (
+            test.closed(limits, task.dt, around, tubes=most, binding=about)
+            for around, about, most in tried
+        )
+        closed = next((found for found in divided if found is not None), None)
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
     if not broken.proved:
