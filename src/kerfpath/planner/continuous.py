@@ -275,7 +275,7 @@ def _clear_motion(
     judged = many and starts.best is None and constant and can_be_slower(task)
     try:
         if judged and task.dt < NEARLY * _interval_of(task, paths):
-            starts.start_from(_quick_enough(task, finder, paths, begin), 0.0)
+            _require_quick_enough(task, finder, paths, begin)
         starts.refine(paths)
         if thorough and explored and finder.is_free and can_explore(task):
             _explore(task, starts, search)
@@ -321,13 +321,15 @@ def _interval_of(task: Task, paths: list[ContinuousPath]) -> float:
     return min((interval_of(task, plan) for plan in plans), default=np.inf)
 
 
-def _quick_enough(
+def _require_quick_enough(
     task: Task,
     finder: CollisionFreeSearch,
     paths: list[ContinuousPath],
     begin: Callable[[str], None],
-) -> Plan:
-    """Return the refinement of a quickest motion that is quick enough, where `paths` are not.
+) -> None:
+    """Require that one of the quickest motions is quick enough, where `paths` are not.
+
+    Begun from that motion, the search leaves out paths that lead to better ones.
 
     Raises
     ------
@@ -341,7 +343,7 @@ def _quick_enough(
         proved=False,
         node=int(sharp.max(axis=-1, initial=0.0).argmax()),
     )
-    return from_quickest(task, finder, none, begin)
+    from_quickest(task, finder, none, begin)
 
 
 def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:

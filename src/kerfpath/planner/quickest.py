@@ -17,7 +17,7 @@ from kerfpath.planner.screening import QUICK
 from kerfpath.planner.straight_moves import not_followed
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
-from kerfpath.refiner import Binding, quicken
+from kerfpath.refiner import MOST_INTERVALS, Binding, quicken
 from kerfpath.search import (
     BeamWidth,
     ContinuousPath,
@@ -268,8 +268,8 @@ def velocity_limited_motions(
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
     If the velocities leave very many edges in the time that a path takes, they are the shortest
-    path by the velocities alone, and that path with gamma moved off the grid. Raises as
-    `quick_motions`.
+    path by the velocities alone, and that path with gamma moved off the grid, nearly to its least
+    interval: they only say how far the speed is too high. Raises as `quick_motions`.
     """
     slow = without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
@@ -279,7 +279,7 @@ def velocity_limited_motions(
     task, best = slow, _along(slow, path)
     yield best
     if task.robot.family.free_rotation:
-        yield faster_motion(task, finder, best.plan, best)
+        yield _faster(task, finder, _at_least_interval(best.plan, most=1), best)
 
 
 def _along(task: Task, least: LeastInterval) -> QuickMotion:
@@ -343,9 +343,9 @@ def quickest_along(task: Task, finder: CollisionFreeSearch, path: ContinuousPath
     return None if found is None or not _allowed(task, finder, found[0]) else found[0]
 
 
-def _at_least_interval(start: Plan) -> tuple[Plan, Binding] | None:
-    """Return a motion moved to its least interval, and what binds it there."""
-    quickened = quicken(start)
+def _at_least_interval(start: Plan, *, most: int = MOST_INTERVALS) -> tuple[Plan, Binding] | None:
+    """Return a motion moved to its least interval, and what binds it there; `most` as `quicken`."""
+    quickened = quicken(start, most=most)
     if quickened is None:
         return None
     made, at = quickened

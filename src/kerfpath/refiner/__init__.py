@@ -2,6 +2,7 @@
 
 from kerfpath.refiner.joint_curves import JointCurves as JointCurves
 from kerfpath.refiner.rates import KeptShares as KeptShares
+from kerfpath.refiner.refinement import MOST_INTERVALS as MOST_INTERVALS
 from kerfpath.refiner.refinement import Binding as Binding
 from kerfpath.refiner.refinement import Refinement as Refinement
 from kerfpath.refiner.refinement import promise as promise

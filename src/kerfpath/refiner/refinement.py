@@ -231,14 +231,15 @@ def reduce_excess(
     return _plan_with_motion(plan, descent.with_reduced_excess(start))
 
 
-def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
+def quicken(plan: Plan, *, most: int = MOST_INTERVALS) -> tuple[Plan, Binding] | None:
     """Return the plan with gamma moved for the least interval between nodes, and what binds there.
 
-    All intervals change by the same factor; the cost is not minimised. None if a node of the plan
+    All intervals change by the same factor, at most `most` times; once is nearly enough. The cost
+    is not minimised. None if a node of the plan
     is out of reach in its posture, as a node between two samples may be, or if a joint or a
     coupling stays out of its range.
     """
-    for _ in range(MOST_INTERVALS):
+    for _ in range(most):
         descent, start = _descent(plan)
         if start.outside == np.inf:
             return None
