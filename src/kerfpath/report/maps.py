@@ -59,23 +59,44 @@ def feasibility_map(
     step, nodes = 360.0 / len(gamma), len(graph.reason)
     parts = 1 if plan is None else (len(plan.q) - 1) // (nodes - 1)
     height = TOP + BOTTOM + len(postures) * ROW + (len(postures) - 1) * GAP
-    figure = go.Figure(layout=base_layout(height, hovermode="closest"))
-    figure.update_layout(margin={"l": 62, "r": 16, "t": TOP, "b": BOTTOM})
+    if s is None and plan is not None:
+        s = plan.contour.s
     used = set() if plan is None else {int(mu) for mu in plan.posture}
+    axes: dict[str, object] = {}
+    annotations = list[dict[str, object]]()
     for row, mu in enumerate(postures):
-        _add_axes(figure, row, len(postures), height, nodes)
-        name = posture_name(mu) + (" (in use)" if mu in used else "")
-        figure.add_annotation(
-            text=name,
-            font={"size": 12, "color": INK if mu in used or plan is None else QUIET},
-            x=0,
-            xref="paper",
-            xanchor="left",
-            y=1,
-            yref=f"{_axis('y', row)} domain",
-            yanchor="bottom",
-            showarrow=False,
+        axes |= _axes(row, len(postures), height, nodes)
+        annotations.append(
+            {
+                "text": posture_name(mu) + (" (in use)" if mu in used else ""),
+                "font": {"size": 12, "color": INK if mu in used or plan is None else QUIET},
+                "x": 0,
+                "xref": "paper",
+                "xanchor": "left",
+                "y": 1,
+                "yref": f"{_axis('y', row)} domain",
+                "yanchor": "bottom",
+                "showarrow": False,
+            }
         )
+    meta = {
+        "reasons": list(graph.reasons),
+        "postures": [posture_name(mu) for mu in postures],
+        "s_mm": [] if s is None else np.round((s - s[0]) * 1e3, 2).tolist(),
+        "nodes": np.round(np.arange((nodes - 1) * parts + 1) / parts, 4).tolist(),
+    }
+    # The layout is set in one call, as each call takes plotly much longer than the heatmaps.
+    layout = base_layout(
+        height,
+        hovermode="closest",
+        margin={"l": 62, "r": 16, "t": TOP, "b": BOTTOM},
+        annotations=[*annotations, *_words_of(marks[:1])],
+        shapes=_lines_of(marks, len(postures)),
+        meta=meta,
+        **axes,
+    )
+    figure = go.Figure(layout=layout)
+    for row, mu in enumerate(postures):
         figure.add_heatmap(
             z=np.ascontiguousarray(graph.reason_by_gamma[:, :, mu].T),
             x0=0,
@@ -94,18 +115,7 @@ def feasibility_map(
         )
         if plan is not None and mu in used:
             _add_choice(figure, plan, mu, row, parts)
-    _add_marks(figure, marks, len(postures))
     _add_legend(figure, graph, postures, has_plan=plan is not None)
-    if s is None and plan is not None:
-        s = plan.contour.s
-    figure.update_layout(
-        meta={
-            "reasons": list(graph.reasons),
-            "postures": [posture_name(mu) for mu in postures],
-            "s_mm": [] if s is None else np.round((s - s[0]) * 1e3, 2).tolist(),
-            "nodes": np.round(np.arange((nodes - 1) * parts + 1) / parts, 4).tolist(),
-        }
-    )
     return figure
 
 
@@ -158,32 +168,31 @@ def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, A
     return pieces
 
 
-def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -> None:
+def _axes(row: int, rows: int, height: int, nodes: int) -> dict[str, object]:
+    """Return both axes of a panel, by their names in the layout."""
     inner = height - TOP - BOTTOM
     top = 1 - row * (ROW + GAP) / inner
     last = row == rows - 1
-    figure.update_layout(
-        {
-            _axis("xaxis", row): axis(
-                anchor=_axis("y", row),
-                matches=None if row == 0 else "x",
-                range=[-0.5, nodes - 0.5],
-                showticklabels=last,
-                showgrid=False,
-                title=axis_title("node along the contour") if last else None,
-            ),
-            _axis("yaxis", row): axis(
-                anchor=_axis("x", row),
-                matches=None if row == 0 else "y",
-                domain=[max(0.0, top - ROW / inner), min(1.0, top)],
-                range=[-180, 180],
-                tickvals=[-180, -90, 0, 90, 180],
-                ticktext=["\N{MINUS SIGN}180°", "\N{MINUS SIGN}90°", "0°", "90°", "180°"],
-                showgrid=False,
-                title=axis_title("gamma"),
-            ),
-        }
-    )
+    return {
+        _axis("xaxis", row): axis(
+            anchor=_axis("y", row),
+            matches=None if row == 0 else "x",
+            range=[-0.5, nodes - 0.5],
+            showticklabels=last,
+            showgrid=False,
+            title=axis_title("node along the contour") if last else None,
+        ),
+        _axis("yaxis", row): axis(
+            anchor=_axis("x", row),
+            matches=None if row == 0 else "y",
+            domain=[max(0.0, top - ROW / inner), min(1.0, top)],
+            range=[-180, 180],
+            tickvals=[-180, -90, 0, 90, 180],
+            ticktext=["\N{MINUS SIGN}180°", "\N{MINUS SIGN}90°", "0°", "90°", "180°"],
+            showgrid=False,
+            title=axis_title("gamma"),
+        ),
+    }
 
 
 def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: int) -> None:
@@ -219,31 +228,40 @@ def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: in
     )
 
 
-def _add_marks(figure: go.Figure, marks: Sequence[tuple[float, str]], rows: int) -> None:
+def _lines_of(marks: Sequence[tuple[float, str]], rows: int) -> list[dict[str, object]]:
+    """Return a dotted line in every panel for each mark, over a white one."""
     halo, dots = {"color": "white", "width": 4}, {"color": ALERT, "width": 2, "dash": "dot"}
-    for (node, _), row, line in product(marks, range(rows), (halo, dots)):
-        figure.add_shape(
-            type="line",
-            x0=node,
-            x1=node,
-            xref=_axis("x", row),
-            y0=0,
-            y1=1,
-            yref=f"{_axis('y', row)} domain",
-            line=line,
-        )
-    if marks:
-        figure.add_annotation(
-            text=f"┊ {escape(marks[0][1])}",
-            font={"size": 12, "color": ALERT},
-            x=1,
-            xref="paper",
-            xanchor="right",
-            y=1,
-            yref="y domain",
-            yanchor="bottom",
-            showarrow=False,
-        )
+    return [
+        {
+            "type": "line",
+            "x0": node,
+            "x1": node,
+            "xref": _axis("x", row),
+            "y0": 0,
+            "y1": 1,
+            "yref": f"{_axis('y', row)} domain",
+            "line": line,
+        }
+        for (node, _), row, line in product(marks, range(rows), (halo, dots))
+    ]
+
+
+def _words_of(marks: Sequence[tuple[float, str]]) -> list[dict[str, object]]:
+    """Return the texts of marks, above the first panel."""
+    return [
+        {
+            "text": f"┊ {escape(words)}",
+            "font": {"size": 12, "color": ALERT},
+            "x": 1,
+            "xref": "paper",
+            "xanchor": "right",
+            "y": 1,
+            "yref": "y domain",
+            "yanchor": "bottom",
+            "showarrow": False,
+        }
+        for _, words in marks
+    ]
 
 
 def _add_legend(

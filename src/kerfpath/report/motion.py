@@ -51,8 +51,9 @@ def joint_positions(plan: Plan) -> go.Figure:
     robot = plan.robot
     rows = (robot.joints + 1) // 2
     height = TOP + BOTTOM + rows * ROW + (rows - 1) * GAP
-    figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
-    figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
+    margin = {"l": 54, "r": 16, "t": TOP, "b": BOTTOM}
+    look = base_layout(height, hovermode="x unified", showlegend=False, margin=margin)
+    figure = go.Figure(layout=look)
     shapes, annotations = _posture_bands(plan, panels=robot.joints, labelled=range(2))
     axes: dict[str, object] = {}
     limits = robot.joint_limits()
@@ -139,11 +140,13 @@ def cutting_speed(plan: Plan) -> go.Figure:
 def limit_shares(plan: Plan) -> go.Figure:
     """Return two panels: joint velocities and accelerations over time, in % of their limits."""
     height = SHARE_TOP + BOTTOM + 2 * SHARE_ROW + GAP
-    figure = go.Figure(layout=base_layout(height, hovermode="x unified"))
-    figure.update_layout(
+    look = base_layout(
+        height,
+        hovermode="x unified",
         margin={"l": 62, "r": 44, "t": SHARE_TOP, "b": BOTTOM},
         legend={"orientation": "h", "x": 0, "y": 1.03, "yanchor": "bottom", "font": {"size": 12}},
     )
+    figure = go.Figure(layout=look)
     shapes, annotations = _posture_bands(plan, panels=2, labelled=())
     axes: dict[str, object] = {}
     middle = (plan.time[:-1] + plan.time[1:]) / 2
