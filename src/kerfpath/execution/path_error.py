@@ -162,8 +162,7 @@ def path_error(
     q = response.standing_around(commanded(run, timing), STEP)
 
     def poses(how: Response) -> Array:
-        moved = run.robot.forward(how.executed(q, STEP, run.robot))
-        return np.asarray(np.linalg.inv(run.T_base_part) @ moved @ run.T_flange_tip)
+        return _tips(run, how.executed(q, STEP, run.robot))
 
     asked = poses(IDEAL)
     executed = asked if response.model == "ideal" else poses(response)
@@ -259,21 +258,25 @@ def share_within(
     It is found by halving, to 3 %, with the zones of the program and the same way of the joints;
     None if the corners alone are too wide, or if `SLOWEST` of the speed is too fast.
     """
-    alone = replace(response, sigma_range=None)
+    drawn, alone = _Drawn.of(path, len(run.tool_motion.T)), replace(response, sigma_range=None)
 
-    def at(share: float) -> PathError:
-        timing = timing_of(run, speed_share=share)
-        return path_error(run, path, timing=timing, response=alone)
+    def largest(share: float, how: Response) -> float:
+        q = how.standing_around(commanded(run, timing_of(run, speed_share=share)), STEP)
+        return drawn.largest(_tips(run, how.executed(q, STEP, run.robot)))
 
-    full = at(1.0)
-    if full.largest <= tolerance:
+    full, corners = largest(1.0, alone), largest(1.0, IDEAL)
+    if full <= tolerance:
         return 1.0
-    corners = float(full.rounding[~full.waste].max())
     if corners >= tolerance:
         return None
     # The lag moves the tip about as the square of the speed.
-    first = float(np.sqrt((tolerance - corners) / (full.largest - corners)))
-    return largest_share(lambda share: at(share).largest <= tolerance, first)
+    first = float(np.sqrt((tolerance - corners) / (full - corners)))
+    return largest_share(lambda share: largest(share, alone) <= tolerance, first)
+
+
+def _tips(run: Executed, q: Array) -> Array:
+    """Return the poses (m, 4, 4) of the tip in the part at joints q (m, n) rad."""
+    return np.asarray(np.linalg.inv(run.T_base_part) @ run.robot.forward(q) @ run.T_flange_tip)
 
 
 def largest_share(
