@@ -1,4 +1,4 @@
-"""Functions that the tests of `kerfpath.isolated` call in another process."""
+"""Functions that tests call in other processes."""
 
 import ctypes
 import os
@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
 
 
@@ -57,3 +58,26 @@ def unpicklable():
 def interrupted():
     os.kill(os.getppid(), signal.SIGINT)
     time.sleep(20)
+
+
+def square_slowly(number):
+    """Return the square, and the process that has computed it."""
+    time.sleep(0.05)
+    return number * number, os.getpid()
+
+
+def binding_nodes(number):
+    time.sleep(0.02)
+    return current_effort().binding_nodes, number
+
+
+def inverse(number):
+    return 1 / number
+
+
+def square_here(process, number):
+    """Return the square in one process; end any other one."""
+    if os.getpid() != process:
+        os._exit(3)
+    time.sleep(0.05)
+    return number * number

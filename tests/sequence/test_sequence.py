@@ -1,6 +1,7 @@
 """Order of cutting and transfer moves."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, permutations, product
 from time import monotonic
@@ -18,6 +19,7 @@ from kerfpath.post import JointMove, build_program, post, preflight
 from kerfpath.sequence import (
     PlannedCuts,
     best_order,
+    cheapest_posture,
     common_postures,
     effort_for,
     inner_first,
@@ -26,7 +28,7 @@ from kerfpath.sequence import (
     order_plans,
     plan_part,
 )
-from kerfpath.sequence.part import MANY, WORTH
+from kerfpath.sequence.part import MANY, SOME, WORTH
 from kerfpath.transfer import back_off, least_time, on_near_turns, transfer_move
 from programs import read_text, text_of
 
@@ -252,8 +254,9 @@ def test_a_part_in_one_posture_never_takes_less_time_than_the_free_one(part, arm
 
 
 def test_postures_are_common_that_half_of_the_contours_can_have():
-    assert common_postures([[0, 1], [0, 2], [0, 1], [3]], [None] * 4) == [[0, 1], [0], [0, 1], []]
-    assert common_postures([[0, 1], [0, 1]], [(1,), None]) == [[1], [0, 1]]
+    served = [[0, 1], [0, 2], [0, 1], [3]]
+    assert common_postures(served, [None] * 4, [[0]] * 4) == [[0, 1], [0], [0, 1], []]
+    assert common_postures([[0, 1], [0, 1]], [(1,), None], [[0]] * 2) == [[1], [0, 1]]
 
 
 def test_plans_are_offered_on_the_turns_that_are_near(part, tool, placement):
@@ -522,7 +525,10 @@ class Settled(PlannedCuts[Plan]):
     def with_plan(self, one: Plan, plan: Plan) -> Plan | None:
         return plan
 
-    def settled(self, one: Plan) -> Plan | None:
+    def settled(self, ones: Sequence[Plan]) -> list[Plan | None]:
+        return [self._settled(one) for one in ones]
+
+    def _settled(self, one: Plan) -> Plan | None:
         self.seen.append(one)
         if self.left:
             self.left -= 1
@@ -567,8 +573,80 @@ def test_others_are_chosen_where_the_final_form_is_refused_or_much_slower(two_st
 
 def test_of_many_contours_one_posture_is_common():
     few, many = ([[0, 1, 3]] * n + [[1, 2]] * 4 for n in (MANY - 4, MANY - 3))
-    assert common_postures(few, [None] * len(few)) == [[0, 1, 3]] * (MANY - 4) + [[1]] * 4
-    assert common_postures(many, [None] * len(many)) == [[1]] * len(many)
+    planned = [[3]] * (MANY - 5) + [[1]] * 6
+    every = common_postures(few, [None] * len(few), planned[:MANY])
+    assert every == [[0, 1, 3]] * (MANY - 4) + [[1]] * 4
+    # The one that most are planned in, not one that all can be cut in.
+    one = common_postures(many, [None] * len(many), planned)
+    assert one == [[3]] * (MANY - 3) + [[]] * 4
+    assert common_postures([[]] * len(many), [None] * len(many), planned) == [[]] * len(many)
+
+
+def test_the_posture_of_many_contours_is_the_cheapest_that_most_can_be_cut_in():
+    asked = []
+
+    def cost(contour, posture):
+        asked.append((contour, posture))
+        return np.inf if posture == 0 and contour == 99 else float(2 - posture % 3)
+
+    wanted = [None] * 100
+    assert cheapest_posture(100, wanted, 4, cost) == 2
+    assert len({contour for contour, _ in asked}) == SOME
+    assert {0, 99} <= {contour for contour, _ in asked}
+    assert cheapest_posture(100, [(0, 1)] * 99 + [(0,)], 4, cost) == 1
+    assert cheapest_posture(100, [(3,)] * 100, 3, cost) is None
+    dear = cheapest_posture(100, wanted, 4, lambda i, p: np.inf if p == 2 and i == 0 else 2.0 - p)
+    assert dear == 3
+
+
+def test_motions_are_said_to_be_turned_and_orders_to_be_sought(two_starts):
+    said = []
+    none = [()] * len(two_starts)
+    every = [range(each[0].robot.postures) for each in two_starts]
+    order_candidates(
+        [each[:1] for each in two_starts], Settled(1.0), none, [list(one) for one in every],
+        progress=lambda *words: said.append(words),
+    )  # fmt: skip
+    whats = list(dict.fromkeys(what for what, _, _ in said))
+    name = two_starts[0][0].name
+    assert whats[0] == f"{name}: other postures"
+    assert [each for each in whats if ":" not in each] == [
+        "turning motions about the beam", "order and moves, at most 240 s without a solution"
+    ]  # fmt: skip
+    turning = [(done, total) for what, done, total in said if what.startswith("turning")]
+    assert turning[:3] == [(0, 3), (1, 3), (2, 3)]
+
+
+def test_a_draft_is_an_order_that_the_solver_can_only_better():
+    rng = np.random.default_rng(5)
+    group = np.repeat(np.arange(12), 2)
+    between = rng.uniform(0.1, 1.0, (24, 24))
+    before = [(0, 3), (5, 2)]
+    draft = best_order(group, np.ones(24), between, before=before, draft=True)
+    best = best_order(group, np.ones(24), between, before=before)
+    assert best.at_least <= best.duration <= draft.duration
+    assert draft.at_least <= best.duration + 1e-9
+    places = group[draft.candidates].tolist()
+    assert sorted(places) == list(range(12))
+    assert places.index(0) < places.index(3)
+    assert places.index(5) < places.index(2)
+    # It never ends above the order that it begins with.
+    again = best_order(
+        group, np.ones(24), between, before=before, draft=True, begin=group[best.candidates]
+    )
+    assert again.duration == pytest.approx(best.duration)
+
+
+def test_the_solver_ends_after_its_work_with_the_same_order():
+    rng = np.random.default_rng(6)
+    group = np.repeat(np.arange(40), 3)
+    between, before = rng.uniform(0.1, 1.0, (120, 120)), [(k, k + 20) for k in range(20)]
+    one, two = (
+        best_order(group, np.ones(120), between, before=before, seconds=0.5) for _ in range(2)
+    )
+    assert not one.optimal
+    assert one.candidates.tolist() == two.candidates.tolist()
+    assert one.at_least == two.at_least > 0
 
 
 def test_valleys_of_many_contours_are_explored_where_more_may_be_saved():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any, cast
@@ -24,6 +25,8 @@ from kerfpath.auditor import (
 )
 from kerfpath.cell import Cell
 from kerfpath.contour import KINDS, Contour, angle_between
+from kerfpath.crew import Crew
+from kerfpath.effort import thread_count
 from kerfpath.errors import InputError
 from kerfpath.execution import Correction, from_stop_to_stop, lengths_of, run_along
 from kerfpath.job.as_run import checks_of_unknown, run_judged
@@ -90,6 +93,7 @@ from kerfpath.post import (
     unsafe_restarts,
 )
 from kerfpath.robots import Robot
+from kerfpath.sequence import are_many
 from kerfpath.tolerances import SAME_POINT
 from kerfpath.transfer import End, back_off, least_times
 
@@ -343,6 +347,24 @@ SAME_SPEED = 0.02
 """Share by which a speed may differ from that of the job, beyond its digits."""
 CLIMB = 0.05
 """Weight of distances along the path against those from it, in the search for a place on it."""
+
+
+def _checked(
+    job: Job, cell: Cell | None, cuts: Sequence[tuple[Candidate, ReadCut]]
+) -> list[tuple[list[Check], tuple[TargetNodes, Plan] | None]]:
+    """Return what `check_cut` finds for each cut; very many are shared with other processes.
+
+    Not with a cell, which cannot be sent to them.
+    """
+    share = are_many(len(cuts)) and cell is None
+    with Crew(thread_count() - 1 if share else 0, __name__) as crew:
+        return crew.each(partial(_check_one, job, cell), cuts)
+
+
+def _check_one(
+    job: Job, cell: Cell | None, one: tuple[Candidate, ReadCut]
+) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:
+    return check_cut(job, *one, cell)
 
 
 def check_cut(
@@ -678,17 +700,22 @@ class Audit:
         done: list[int] = []
         starts: list[str] = []
         followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
-        for cut, (apart, which, c) in zip(cuts, closest, strict=True):
+        # Arcs are divided at nodes of their contour.
+        near = [
+            (contours[which].candidates[c], divide_arcs(cut, contours[which].candidates[c].dt, job))
+            for cut, (apart, which, c) in zip(cuts, closest, strict=True)
+            if apart < NEAR
+        ]
+        checked = zip(near, _checked(job, cell, near), strict=True)
+        for cut, (apart, which, _) in zip(cuts, closest, strict=True):
             title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
             places[title] = tuple(move.place for move in cut.moves)
             if apart >= NEAR:
                 said = "distance from the nearest contour of the job"
                 tables[title] = [check("contour", said, apart, NEAR, "m")]
                 continue
-            candidate = contours[which].candidates[c]
-            cut = divide_arcs(cut, candidate.dt, job)
+            (_, cut), (tables[title], along) = next(checked)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
-            tables[title], along = check_cut(job, candidate, cut, cell)
             if not np.isnan(cut.q).any():
                 moves = _moves(cut, job.program.rules.controller)
                 tables[title] += check_power(job, options[which], cut.group, moves, cut.ends)

@@ -7,6 +7,8 @@ from kerfpath.sequence.order import best_order as best_order
 from kerfpath.sequence.order import inner_first as inner_first
 from kerfpath.sequence.part import PartPlan as PartPlan
 from kerfpath.sequence.part import PlannedCuts as PlannedCuts
+from kerfpath.sequence.part import are_many as are_many
+from kerfpath.sequence.part import cheapest_posture as cheapest_posture
 from kerfpath.sequence.part import common_postures as common_postures
 from kerfpath.sequence.part import distances_between as distances_between
 from kerfpath.sequence.part import effort_for as effort_for

@@ -22,6 +22,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner import best_motion, folds, layered_graph, plan, turned, with_bound
 from kerfpath.plans import Plan, TransferMove
+from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot
 from kerfpath.sequence.order import Order, best_order
 from kerfpath.setup import Setup
@@ -39,18 +40,60 @@ from kerfpath.transfer import (
 # Parts of many contours, of which less is compared for each.
 
 MANY = 40
-"""Contours of a part beyond which they are planned in one common posture, valleys are explored only
-beyond a gap of `WORTH`, and an order whose candidates are final is taken at the latest the second
-time, see `LONGER`."""
+"""Contours of a part beyond which they are planned in one common posture alone, without wider
+searches; valleys of others are explored only beyond a gap of `WORTH`; and an order stands however
+much longer it takes with its candidates in their final form, see `LONGER`: to seek it again gained
+0.6 % of 201 contours, and as many audits as before."""
+SOME = 5
+"""Contours of such a part that are planned in every posture to choose the common one."""
 WORTH = 0.1
+"""`Effort.worth_exploring` of such parts: what a contour may cost more for want of an exploration
+is small beside the moves between hundreds of them, and exploring all takes most of the time."""
 
 
 @contextmanager
 def effort_for(contours: int) -> Iterator[None]:
     """Plan with the effort that each of so many contours is worth, until the block ends."""
     worth = current_effort().worth_exploring
-    with changed_effort(worth_exploring=worth if contours <= MANY else max(WORTH, worth)):
+    with changed_effort(worth_exploring=max(WORTH, worth) if are_many(contours) else worth):
         yield
+
+
+def are_many(contours: int) -> bool:
+    """Return whether a part has so many contours that less is compared for each, see `MANY`."""
+    return contours > MANY
+
+
+def cheapest_posture(
+    contours: int,
+    wanted: Sequence[Sequence[int] | None],
+    postures: int,
+    cost: Callable[[int, int], float],
+) -> int | None:
+    """Return the posture in which most of some contours can be cut, and in which they cost least.
+
+    None is returned if none of them can be cut in any.
+
+    Parameters
+    ----------
+    contours : int
+        Number of contours; `SOME` of them are looked at.
+    wanted : sequence of sequences of int, or None
+        Postures that each contour may be cut in; None: all.
+    postures : int
+        Number of postures of the arm.
+    cost : callable
+        Returns the cost of the motion along a contour in a posture, both given by number; infinite
+        where there is none.
+    """
+    some = spread(contours, SOME).tolist()
+    best: tuple[int, float, int] | None = None
+    for posture in range(postures):
+        may = [i for i in some if (asked := wanted[i]) is None or posture in asked]
+        found = [each for i in may if np.isfinite(each := cost(i, posture))]
+        if found and (best is None or (-len(found), sum(found)) < best[:2]):
+            best = (-len(found), sum(found), posture)
+    return None if best is None else best[2]
 
 
 # -----------------------------------------------------------------------------
@@ -65,18 +108,22 @@ def unused_postures(made: Sequence[Plan], wanted: Iterable[int] | None) -> list[
 
 
 def common_postures(
-    served: Sequence[Iterable[int]], wanted: Sequence[Sequence[int] | None]
+    served: Sequence[Iterable[int]],
+    wanted: Sequence[Sequence[int] | None],
+    planned: Sequence[Iterable[int]],
 ) -> list[list[int]]:
     """Return the postures in which each contour is planned so that a part may keep to one.
 
     They are the wanted ones (None: all) in which at least half of the contours can be cut; of more
-    than `MANY` contours the one in which most can be cut.
+    than `MANY` contours only the one of them in which most are planned already.
 
     Parameters
     ----------
     served : sequence of iterables of int
         The postures that have a pose at every node of each contour.
     wanted : sequence of sequences of int, or None
+    planned : sequence of iterables of int
+        The postures in which each contour has a plan.
     """
     able = [
         {int(p) for p in here if asked is None or p in asked}
@@ -84,8 +131,9 @@ def common_postures(
     ]
     often = Counter(p for each in able for p in sorted(each))
     shared = {p for p, n in often.items() if 2 * n >= len(able)}
-    if len(able) > MANY:
-        shared &= {p for p, _ in often.most_common(1)}
+    if len(able) > MANY and shared:
+        have = Counter(p for each in planned for p in set(each))
+        shared = {max(sorted(shared), key=lambda p: (have[p], often[p]))}
     return [sorted(each & shared) for each in able]
 
 
@@ -160,11 +208,16 @@ def _reachable(
 TURNED, SHORTER = 2, 1e-3
 """How often chosen candidates are turned towards their neighbours at most, and the relative time
 that it must save to be done again."""
+RIVAL = 0.02
+"""Relative extra time up to which the order within one posture is turned towards its neighbours,
+too: it may gain more by that than the best one."""
 LONGER = 1e-3
 """Relative extra time up to which an order is kept although the final form of its candidates is not
 the one that it was found with."""
 FEW = 9
 """Nodes of a contour at which a posture needs a pose for the contour to be tried in it."""
+TURNING = "turning motions about the beam"
+"""What is in progress while candidates are turned."""
 T = TypeVar("T")
 
 
@@ -278,8 +331,8 @@ class OrderOptions:
     pierce_time : float s, or one for each contour
         Time to pierce.
     seconds : float s
-        Time limit of the order solver, and of each search for a way around; searches without a
-        result end after `longest_search(seconds)` in total.
+        Work limit of the order solver, see `best_order`, and time limit of each search for a way
+        around; searches without a result end after `longest_search(seconds)` in total.
 
     Raises
     ------
@@ -401,13 +454,14 @@ def plan_part(
                 return planned(contour, nodes, own)
             setup = Setup.of(robot, tool, placement, order.get("cell"))
             at = None if nodes.time is not None else speeds[contour]
-            return best_motion(nodes, setup, own, speed=at)
+            wide = not are_many(len(groups))
+            return best_motion(nodes, setup, own, speed=at, thorough=wide)
 
         def with_plan(self, one: Plan, plan: Plan) -> Plan:
             return plan
 
-        def settled(self, one: Plan) -> Plan:
-            return one
+        def settled(self, ones: Sequence[Plan]) -> Sequence[Plan]:
+            return ones
 
     postures = [wanted.postures] * len(groups)
     served: list[Iterable[int]] = [()] * len(groups)
@@ -419,7 +473,8 @@ def plan_part(
                 fold=folds(robot, wanted, 0.0),
             )  # fmt: skip
             served[i] = graph.postures_throughout.tolist()
-    common = common_postures(served, postures)
+    planned_in = [[int(made.posture[0]) for made in each] for each in tried]
+    common = common_postures(served, postures, planned_in)
     found = order_candidates(tried, Cuts(), postures, common, **order)
     work = SharedWork([len(made.q) for made in found.plans])
     bounded = tuple(with_bound(made, asked.certify, work=work) for made in found.plans)
@@ -444,10 +499,10 @@ class PlannedCuts(Protocol[T]):
         """Return a candidate with its plan turned about the beam; None if it must not be."""
         ...
 
-    def settled(self, one: T) -> T | None:
-        """Return a candidate that an order has chosen in its final form.
+    def settled(self, ones: Sequence[T]) -> Sequence[T | None]:
+        """Return candidates that an order has chosen in their final form.
 
-        Returns None if it may not be used.
+        It is None where one may not be used.
         """
         ...
 
@@ -471,7 +526,7 @@ class _Candidates(Generic[T]):
         self,
         contour: int,
         wanted: Iterable[int] | None,
-        progress: Callable[[int, int, int], None],
+        progress: Progress,
         *,
         quick: bool,
     ) -> list[Plan]:
@@ -479,22 +534,24 @@ class _Candidates(Generic[T]):
         each = self.tried[contour]
         made = len(each)
         unused = unused_postures(self.plans[contour], wanted)
+        name = self._cuts.plan_of(each[0]).name
         for k, posture in enumerate(unused):
-            progress(contour, k, len(unused))
+            progress(f"{name}: other postures", k, len(unused))
             one = None
             with suppress(NoFeasiblePath):
                 one = self._cuts.in_posture(contour, posture, quick=quick)
             each += [] if one is None else [one]
         return self.plans[contour][made:]
 
-    def turn_alike(self, contours: Iterable[int]) -> None:
+    def turn_alike(self, contours: Sequence[int], progress: Progress) -> None:
         """Offer candidates of contours turned about the beam, alike in each posture.
 
         They are turned towards the first one in their posture, and that one towards home, or the
         first one of all if there is no home. Turned candidates replace those that were added.
         """
         near, first = dict[int, Array](), self._home
-        for i in contours:
+        for k, i in enumerate(contours):
+            progress(TURNING, k, len(contours))
             for c, one in enumerate(self.tried[i][:]):
                 posture = int(self._cuts.plan_of(one).posture[0])
                 first = self._mean(one) if first is None else first
@@ -506,7 +563,26 @@ class _Candidates(Generic[T]):
                     self.tried[i].append(other)
                 near.setdefault(posture, self._mean(one if other is None else other))
 
-    def turn_between(self, found: PartPlan, contours: Collection[int]) -> bool:
+    def posture_alone(self, posture: int, before: PartPlan) -> PartPlan | None:
+        """Return a quick order of the candidates in one posture, from that of `before` on.
+
+        None is returned where a contour has none, or there is no such order.
+        """
+        held = [
+            [c for c, plan in enumerate(each) if (plan.posture == posture).all()]
+            for each in self.plans
+        ]
+        if not all(held):
+            return None
+        alone = [[plans[c] for c in own] for plans, own in zip(self.plans, held, strict=True)]
+        begin = [i for i, _ in before.chosen]
+        try:
+            found = order_plans(alone, begin=begin, draft=True, **self._keywords)
+        except NoFeasiblePath:
+            return None
+        return replace(found, chosen=tuple((i, held[i][c]) for i, c in found.chosen))
+
+    def turn_between(self, found: PartPlan, contours: Collection[int], progress: Progress) -> bool:
         """Offer the chosen candidates turned towards their neighbours; return whether any is new.
 
         They are turned to where the moves before and after them come from and go to.
@@ -516,7 +592,9 @@ class _Candidates(Generic[T]):
         )
         before, after = [self._home, *ends[:-1]], [*starts[1:], self._home]
         new = False
-        for (i, c), one, two in zip(found.chosen, before, after, strict=True):
+        around = zip(found.chosen, before, after, strict=True)
+        for k, ((i, c), one, two) in enumerate(around):
+            progress(TURNING, k, len(before))
             behind, ahead = (two if one is None else one), (one if two is None else two)
             if i in contours and behind is not None and ahead is not None:
                 other = self._turned(self.tried[i][c], behind, ahead)
@@ -537,11 +615,10 @@ class _Candidates(Generic[T]):
             None of the candidates of a contour may be used.
         """
         same = usable = True
-        for i, c in found.chosen:
-            one = self.tried[i][c]
-            if any(one is other for other in self._final):
-                continue
-            settled = self._cuts.settled(one)
+        final = {id(one) for one in self._final}
+        new = [(i, c) for i, c in found.chosen if id(self.tried[i][c]) not in final]
+        ones = [self.tried[i][c] for i, c in new]
+        for (i, c), one, settled in zip(new, ones, self._cuts.settled(ones), strict=True):
             last = [] if settled is None else [settled]
             self.tried[i][c : c + 1] = last
             self._final += last
@@ -562,7 +639,8 @@ class _Candidates(Generic[T]):
         chosen = dict(found.chosen)
         alone = [[made[chosen[i]]] for i, made in enumerate(self.plans)]
         try:
-            last = order_plans(alone, **self._keywords)
+            begin = [i for i, _ in found.chosen]
+            last = order_plans(alone, begin=begin, draft=are_many(len(alone)), **self._keywords)
         except NoFeasiblePath:
             return None
         if last.order.duration > (1 + longer) * found.order.duration:
@@ -592,7 +670,7 @@ def order_candidates(
     cuts: PlannedCuts[T],
     postures: Sequence[Sequence[int] | None],
     common: Sequence[Sequence[int]],
-    progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
+    progress: Progress = no_progress,
     **order: Unpack[OrderKeywords],
 ) -> PartPlan:
     """Order candidates by `order_plans`, planned in common postures, and in others where needed.
@@ -612,8 +690,6 @@ def order_candidates(
     common : sequence of sequences of int
         Postures that each contour is planned in before the order is sought, see `common_postures`.
     progress : callable
-        Called with the number of a contour, how many other postures of it are done, and how many
-        there are.
     order
         The other keywords of `order_plans`.
 
@@ -630,26 +706,39 @@ def order_candidates(
     for i, wanted in enumerate(common):
         offered.add(i, wanted, progress, quick=True)
     may_turn = [i for i, wanted in enumerate(common) if wanted]
-    offered.turn_alike(may_turn)
+    offered.turn_alike(may_turn, progress)
+    longest = longest_search(OrderOptions(**order).seconds)
 
-    def ordered() -> PartPlan:
+    def ordered(*, draft: bool = False, begin: PartPlan | None = None) -> PartPlan:
+        progress(f"order and moves, at most {longest:g} s without a solution", 0, 0)
         return order_plans(
             offered.plans,
             more=lambda i: offered.add(i, postures[i], progress, quick=False),
+            begin=None if begin is None else [i for i, _ in begin.chosen],
+            draft=draft,
             **order,
         )
 
-    found = ordered()
+    many = are_many(len(tried))
+    found = ordered(draft=many)
     for _ in range(TURNED):
-        if not offered.turn_between(found, may_turn):
+        if not offered.turn_between(found, may_turn, progress):
             break
-        took, found = found.order.duration, ordered()
+        took, found = found.order.duration, ordered(draft=many, begin=found)
         if found.order.duration > (1 - SHORTER) * took:
             break
-    allowed = LONGER
+    if many:
+        found = ordered(begin=found)
+    else:
+        new = False
+        for posture in sorted({p for wanted in common for p in wanted}):
+            alone = offered.posture_alone(posture, found)
+            if alone is not None and alone.order.duration <= (1 + RIVAL) * found.order.duration:
+                new |= offered.turn_between(alone, may_turn, progress)
+        found = ordered(begin=found) if new else found
+    allowed = np.inf if many else LONGER
     while (settled := offered.settle(found, allowed)) is None:
-        found = ordered()
-        allowed = LONGER if len(tried) <= MANY else np.inf
+        found = ordered(begin=found)
     found = settled
     # On the turns that the order has chosen.
     made = zip(found.chosen, found.plans, strict=True)
@@ -661,6 +750,8 @@ def order_plans(
     candidates: Sequence[Sequence[Plan]],
     *,
     more: Callable[[int], Sequence[Plan]] = lambda contour: (),
+    begin: Sequence[int] | None = None,
+    draft: bool = False,
     **keywords: Unpack[OrderKeywords],
 ) -> PartPlan:
     """Return one plan for each contour, chosen from its candidates, in the order of least time.
@@ -678,6 +769,9 @@ def order_plans(
     more : callable, optional
         Returns further plans of a contour, given its number, in other postures. They become
         candidates of the contour and are numbered after the others.
+    begin, draft
+        As in `best_order`: contours in an order to begin with, and whether that of a quick search
+        is enough.
     **keywords
         As in `OrderOptions`; `before` must agree with `given_order`.
 
@@ -727,8 +821,9 @@ def order_plans(
         each = np.array(pierce)[group if isinstance(pierce, Sequence) else ...]
         own += each + 2 * options.retract / options.approach_speed
         found = _settle_order(
-            air, group, own, before, np.where(warm, options.heat_time, 0.0), options.seconds
-        )
+            air, group, own, before, np.where(warm, options.heat_time, 0.0), options.seconds,
+            begin, draft=draft,
+        )  # fmt: skip
         if not isinstance(found, NoFeasiblePath):
             order = found
             break
@@ -763,20 +858,27 @@ def longest_search(seconds: float) -> float:
 
 def _settle_order(
     air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], rest: Array,
-    seconds: float,
+    seconds: float, begin: Sequence[int] | None, *, draft: bool,
 ) -> Order | NoFeasiblePath:  # fmt: skip
-    """Return the best order in which every move has a way, or why none is found."""
-    failed = len(air.failed)
+    """Return the best order in which every move has a way, or why none is found.
+
+    Of very many groups, moves are planned along drafts before the solver begins.
+    """
+    failed, drafts = len(air.failed), draft or are_many(len(rest))
     while len(air.failed) - failed < PATIENCE:
         try:
             order = best_order(
                 group, own, air.between,
-                first=air.first, last=air.last, before=before, rest=rest, seconds=seconds,
+                first=air.first, last=air.last, before=before, rest=rest, begin=begin,
+                draft=drafts, seconds=seconds,
             )  # fmt: skip
         except NoFeasiblePath as none:
             return air.why_no_order(none)
-        if not air.look_at(order.candidates):
+        if air.look_at(order.candidates):
+            continue
+        if draft or not drafts:
             return order
+        drafts, begin = False, group[order.candidates].tolist()
     return air.why_no_order(None)
 
 

@@ -38,6 +38,7 @@ from kerfpath.progress import (
     unstopped,
 )
 from kerfpath.refiner import refine
+from kerfpath.sequence import are_many
 
 _T = TypeVar("_T")
 GraphOf = Callable[[Job, Contour, Callable[[int], None]], LayeredGraph]
@@ -216,7 +217,7 @@ def cut_in_posture(
     """Return the candidate of a cut with a plan cut in one posture; None where its audit fails.
 
     If `quick`, it is given up where it would be planned on the grid, and not audited until it is
-    `settled`.
+    `settled`; of very many contours no wider searches follow.
 
     Raises
     ------
@@ -229,7 +230,7 @@ def cut_in_posture(
     if quick and job.options.method == "continuous":
         made = best_motion(
             candidate.nodes, job.setup_in(prepared.cell), _at_nodes(job), speed=candidate.speed,
-            graph=graph,
+            graph=graph, thorough=not are_many(len(prepared.contours)),
         )  # fmt: skip
     else:
         made = plan(
@@ -242,8 +243,32 @@ def cut_in_posture(
         other = CutResult(request=request, candidate=candidate, graph=graph)
     if quick:
         return replace(other, plan=made)
-    other = _audited(prepared, other, made)
+    other = _audited(prepared.job, prepared.cell, other, made)
     return other if other.passed else None
+
+
+def unplanned(
+    prepared: PreparedJob, request: CutRequest, candidate: Candidate, progress: Progress
+) -> CutResult:
+    """Return the cut of a candidate without a plan, with its graph of all postures.
+
+    The robot has no free joints.
+    """
+    name, done = request.task.name, 0
+
+    def solved(count: int) -> None:
+        nonlocal done
+        may_stop()
+        done += count
+        progress(name, done, len(candidate.nodes))
+
+    progress(name, 0, len(candidate.nodes))
+    job = replace(prepared.job, options=replace(request.options, certify=None))
+    graph = job.graph(candidate.nodes, folded_at=candidate.dt, progress=solved)
+    return _whole(
+        job, request, candidate, graph, prepared.cell,
+        lambda what: progress(f"{name}: {what}", 0, 0),
+    )  # fmt: skip
 
 
 def _without_plan(cut: CutResult) -> CutResult:
@@ -268,7 +293,9 @@ def cut_as_before(
         job, request, candidate, graph, prepared.cell,
         lambda what: progress(f"{name}: {what}", 0, 0),
     )  # fmt: skip
-    cut = with_checks(prepared, replace(whole, kept="picked" if picked else "planned"), made)
+    cut = with_checks(
+        job, prepared.cell, replace(whole, kept="picked" if picked else "planned"), made
+    )
     return replace(cut, as_run=as_programmed(prepared.job, made, candidate.path, prepared.cell))
 
 
@@ -292,8 +319,15 @@ def audited(prepared: PreparedJob, cut: CutResult, progress: Progress = no_progr
     if cut.plan is None or cut.audited:
         return cut
     progress(f"{cut.request.task.name}: audit", 0, 0)
+    return audited_in(prepared.job, prepared.cell, cut)
+
+
+def audited_in(job: Job, cell: Cell | None, cut: CutResult) -> CutResult:
+    """Return a cut with its audit as `audited` does, by the job and its cell alone."""
+    if cut.plan is None or cut.audited:
+        return cut
     with unstopped():
-        return _audited(prepared, _without_plan(cut), cut.plan)
+        return _audited(job, cell, _without_plan(cut), cut.plan)
 
 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:
@@ -337,12 +371,12 @@ def _cuts_of(
         return (replace(whole, plan=plans[0]),)
     begin("audit")
     with unstopped():
-        return tuple(_audited(prepared, whole, made) for made in plans)
+        return tuple(_audited(prepared.job, prepared.cell, whole, made) for made in plans)
 
 
-def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
+def _audited(job: Job, cell: Cell | None, whole: CutResult, made: Plan) -> CutResult:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
-    job, candidate, graph = prepared.job, whole.candidate, whole.graph
+    candidate, graph = whole.candidate, whole.graph
     # All postures that the job allows; the search may have used only some of them.
     postures, between = job.options.postures, job.options.between_nodes
     settings = replace(made.settings, postures=postures, between_nodes=between)
@@ -357,14 +391,14 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         made = _divided(made, candidate.path, job.options.refine_parts)
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
-    cut = with_checks(prepared, replace(whole, candidate=candidate, graph=graph), made)
-    return replace(cut, as_run=as_programmed(job, made, candidate.path, prepared.cell, kept))
+    cut = with_checks(job, cell, replace(whole, candidate=candidate, graph=graph), made)
+    return replace(cut, as_run=as_programmed(job, made, candidate.path, cell, kept))
 
 
-def with_checks(prepared: PreparedJob, cut: CutResult, made: Plan) -> CutResult:
+def with_checks(job: Job, cell: Cell | None, cut: CutResult, made: Plan) -> CutResult:
     """Return a cut with a plan and the audit of that plan; how it runs is not looked at again."""
-    tolerances, candidate = prepared.job.tolerances, cut.candidate
-    checks = tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
+    tolerances, candidate = job.tolerances, cut.candidate
+    checks = tolerances.checks(made, reference=candidate.path, cell=cell)
     checks += candidate.drawing_checks(made.contour, tolerances.path)
     return replace(cut, plan=made, checks=tuple(checks))
 

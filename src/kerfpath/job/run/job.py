@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,14 +13,18 @@ import numpy as np
 from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
 from kerfpath.certifier import SharedWork
+from kerfpath.crew import ALONE, Crew
+from kerfpath.effort import thread_count
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.job.format import Job, PreparedJob, prepare
+from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, prepare
 from kerfpath.job.run.contour import (
     advised,
     audited,
+    audited_in,
     cut_in_posture,
     moved_into_reach,
     plan_candidate,
+    unplanned,
     with_checks,
 )
 from kerfpath.job.run.doubts import both_sides
@@ -31,9 +36,10 @@ from kerfpath.plans import Plan
 from kerfpath.progress import Progress, StopEarly, may_stop, no_progress, unstopped
 from kerfpath.sequence import (
     PlannedCuts,
+    are_many,
+    cheapest_posture,
     common_postures,
     effort_for,
-    longest_search,
     order_candidates,
 )
 
@@ -45,6 +51,7 @@ def order_cuts(
     prepared: PreparedJob,
     tried: Sequence[Sequence[tuple[CutResult, ...]]],
     progress: Progress,
+    crew: Crew = ALONE,
 ) -> JobResult:
     """Return one cut (or its pieces) of each contour's candidates, in the requested order.
 
@@ -59,6 +66,8 @@ def order_cuts(
         audited yet are once they are chosen. Contours at the end may lack: they are not planned,
         and there is no order.
     progress : callable
+    crew : Crew, optional
+        Processes that share the audits.
     """
     job = prepared.job
     result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
@@ -78,8 +87,6 @@ def order_cuts(
         return replace(result, cuts=every, not_planned=left)
     units, owner, before = _units(passed, prepared.inner_first)
 
-    longest = longest_search(job.sequence.seconds)
-    progress(f"order and moves, at most {longest:g} s without a solution", 0, 0)
     requests = [prepared.contours[i] for i in owner]
     # Picked plans and pieces are not planned in other postures.
     others = [
@@ -91,6 +98,7 @@ def order_cuts(
         else units[u][0].graph.postures_throughout.tolist()
         for u, (r, i) in enumerate(zip(requests, owner, strict=True))
     ]  # fmt: skip
+    planned = [[int(_plan(one).posture[0]) for one in unit] for unit in units]
 
     def in_given_order(stuck: NoFeasiblePath) -> JobResult:
         every = [[(one,) for one in unit] or tried[i] for unit, i in zip(units, owner, strict=True)]
@@ -102,12 +110,10 @@ def order_cuts(
     try:
         part = order_candidates(
             units,
-            _JobCuts(prepared, units, progress),
+            _JobCuts(prepared, units, crew, progress),
             others,
-            common_postures(served, others),
-            progress=lambda unit, done, total: progress(
-                f"{requests[unit].task.name}: other postures", done, total
-            ),
+            common_postures(served, others, planned),
+            progress=progress,
             home=job.home,
             cell=prepared.cell,
             before=before,
@@ -139,9 +145,13 @@ class _JobCuts(PlannedCuts[CutResult]):
     """How the cuts of a job are planned for an order; numbers of contours are those of units."""
 
     def __init__(
-        self, prepared: PreparedJob, units: Sequence[Sequence[CutResult]], progress: Progress
+        self,
+        prepared: PreparedJob,
+        units: Sequence[Sequence[CutResult]],
+        crew: Crew,
+        progress: Progress,
     ) -> None:
-        self._prepared, self._progress = prepared, progress
+        self._prepared, self._crew, self._progress = prepared, crew, progress
         self._first = [unit[0] for unit in units]
 
     def plan_of(self, one: CutResult) -> Plan:
@@ -154,9 +164,13 @@ class _JobCuts(PlannedCuts[CutResult]):
         is_whole = len(plan.q) == len(one.candidate.nodes)  # its intervals are not divided
         return replace(one, plan=plan, checks=()) if is_whole else None
 
-    def settled(self, one: CutResult) -> CutResult | None:
-        done = audited(self._prepared, one, self._progress)
-        return done if done.passed else None
+    def settled(self, ones: Sequence[CutResult]) -> list[CutResult | None]:
+        found = self._crew.each(
+            partial(audited_in, self._prepared.job, self._prepared.cell),
+            ones,
+            lambda one: self._progress(f"{one.request.task.name}: audit", 0, 0),
+        )
+        return [done if done.passed else None for done in found]
 
 
 def _first_that_passes(
@@ -205,7 +219,7 @@ def _as_ordered(prepared: PreparedJob, cut: CutResult, made: Plan) -> CutResult:
     limited = ~made.robot.endless
     if np.array_equal(made.q[:, limited], _plan(cut).q[:, limited]):
         return replace(cut, plan=made)
-    return with_checks(prepared, cut, made)
+    return with_checks(prepared.job, prepared.cell, cut, made)
 
 
 def _plan(cut: CutResult) -> Plan:
@@ -247,25 +261,108 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
         may_stop()
         progress(what, done, total)
 
+    with _crew_of(prepared) as crew:
+        return _run_by(crew, prepared, progress, stoppable)
+
+
+def _crew_of(prepared: PreparedJob) -> Crew:
+    """Return processes beside this one for very many contours, with a thread each.
+
+    There are none with a cell, which cannot be sent to them.
+    """
+    share = are_many(len(prepared.contours)) and prepared.cell is None
+    return Crew(thread_count() - 1 if share else 0, __name__)
+
+
+def _run_by(
+    crew: Crew, prepared: PreparedJob, progress: Progress, stoppable: Progress
+) -> JobResult:
+    """Plan and audit every contour of a prepared job as `run_prepared` does."""
     tried, count = list[list[tuple[CutResult, ...]]](), len(prepared.contours)
     with suppress(StopEarly), effort_for(count):
+        posture = _posture_of_all(prepared, stoppable)
         for contour in prepared.contours:
             may_stop()
             if count > 1:
                 progress("contours", len(tried), count)
-            found = [plan_candidate(prepared, contour, c, progress) for c in contour.candidates]
+            found = [_planned(prepared, contour, c, posture, progress) for c in contour.candidates]
             tried.append(
                 [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )
     with effort_for(count):
-        result = order_cuts(prepared, tried, stoppable)
-    return finished(prepared, result, stoppable)
+        result = order_cuts(prepared, tried, stoppable, crew)
+    return finished(prepared, result, stoppable, crew)
 
 
-def finished(prepared: PreparedJob, result: JobResult, progress: Progress) -> JobResult:
-    """Return the result with bounds, advice, warnings, and the departures of its nodes."""
-    work = shared_work(result.cuts)
-    cuts = tuple(certified(cut, progress, work) for cut in result.cuts)
+def _posture_of_all(prepared: PreparedJob, progress: Progress) -> int | None:
+    """Return the posture in which all contours are planned first if they are very many, else None.
+
+    The order of cutting keeps to one posture nearly throughout, as changes of it take long.
+    """
+    job, requests = prepared.job, prepared.contours
+    if not (are_many(len(requests)) and job.sequence is not None) or job.robot.free.size:
+        return None
+    if job.options.method != "continuous" or any(each.run is not None for each in requests):
+        return None
+    cuts = dict[int, CutResult]()
+
+    def cost(contour: int, posture: int) -> float:
+        progress("choosing the posture", posture, job.robot.postures)
+        request = requests[contour]
+        if contour not in cuts:
+            cuts[contour] = unplanned(prepared, request, request.candidates[0], no_progress)
+        cut = cuts[contour]
+        if posture in cut.graph.postures_throughout:
+            with suppress(NoFeasiblePath):
+                found = cut_in_posture(prepared, cut, posture, quick=True)
+                return np.inf if found is None else _plan(found).cost
+        return np.inf
+
+    wanted = [request.options.postures for request in requests]
+    return cheapest_posture(len(requests), wanted, job.robot.postures, cost)
+
+
+def _planned(
+    prepared: PreparedJob,
+    request: CutRequest,
+    candidate: Candidate,
+    posture: int | None,
+    progress: Progress,
+) -> tuple[CutResult, ...]:
+    """Plan a candidate in the posture of all contours where that is possible, else in any.
+
+    Without a posture of all, it is planned in its best one.
+    """
+    asked = request.options.postures
+    if posture is None or not (asked is None or posture in asked):
+        return plan_candidate(prepared, request, candidate, progress)
+    cut = unplanned(prepared, request, candidate, progress)
+    if posture in cut.graph.postures_throughout:
+        with suppress(NoFeasiblePath):
+            found = cut_in_posture(prepared, cut, posture, quick=True)
+            if found is not None:
+                return (found,)
+    return plan_candidate(prepared, request, candidate, progress, graph_of=lambda *_: cut.graph)
+
+
+def finished(
+    prepared: PreparedJob, result: JobResult, progress: Progress, crew: Crew = ALONE
+) -> JobResult:
+    """Return the result with bounds, advice, warnings, and the departures of its nodes.
+
+    Processes of a `crew` share the bounds.
+    """
+    if are_many(len(result.cuts)):
+        nodes = [len(plan.q) for plan in result.plans]
+
+        def begin(cut: CutResult) -> None:
+            with suppress(StopEarly):  # the bound itself ends early, and says so
+                progress(f"{cut.name}: certificate", 0, 0)
+
+        cuts = tuple(crew.each(partial(_certified_alone, nodes), result.cuts, begin))
+    else:
+        work = shared_work(result.cuts)
+        cuts = tuple(certified(cut, progress, work) for cut in result.cuts)
     moves = dict[str, Remedy]()
     with suppress(StopEarly):
         moves = moved_into_reach(prepared, cuts)
@@ -293,6 +390,14 @@ def shared_work(cuts: Sequence[CutResult]) -> SharedWork:
     """Return the work that the bounds of a job's cuts share."""
     asked = [cut for cut in cuts if cut.request.options.certify and not cut.kept]
     return SharedWork([len(cut.plan.q) for cut in asked if cut.plan is not None])
+
+
+def _certified_alone(nodes: Sequence[int], cut: CutResult) -> CutResult:
+    """Return a cut with its bound, of an equal share of the work of plans of so many `nodes`.
+
+    What others leave of theirs is not used, so that the order does not matter.
+    """
+    return certified(cut, no_progress, SharedWork(nodes))
 
 
 def certified(cut: CutResult, progress: Progress, work: SharedWork | None = None) -> CutResult:
