@@ -19,6 +19,15 @@ either counts.
 
 A stage may have multipliers nu of (6), which tilt the cost of a step (see `Stage`). Cells through
 which every motion costs more than the plan drop out, and the next stage covers those that remain.
+
+What the stages leave may be divided into branches, again and again: at a node into the cells in one
+posture and all others, or into those on either side of a value of gamma. Each motion passes a cell
+of that node, so that it is in one of the two. A branch is bounded by stages of its own, and by
+vectors y of the increments and nu of (6). With q_k on one interval of gamma in one posture, a
+motion costs at least the sum of the least of (y_{k-1} - y_k) . q_k over these intervals, of the
+least of rho(u) + (nu_k - nu_{k+1} - y_k) . u over the increments that (5) allows, and of
+-|nu_k| . A. If that is above 0 without rho, the branch has no motion. The bound is the least of all
+branches.
 """
 
 from __future__ import annotations
@@ -38,6 +47,7 @@ __all__ = [
     "LEAST_GAP",
     "LIFTS",
     "USUAL",
+    "Branch",
     "Certificate",
     "Certify",
     "Stage",
@@ -167,6 +177,38 @@ class Stage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Branch:
+    """A part of the motions that the stages of a certificate leave.
+
+    Parameters
+    ----------
+    stages : tuple of Stage
+        They bound its motions, each those that the one before leaves.
+    y : (K-1, n) float64, optional
+        Prices of the increments.
+    multipliers : (K, n) float64, optional
+        nu at each node, zero at the first and the last; as y only where both are given.
+    node : int
+        Node at which the branch is divided in two, which follow it in the certificate, the first
+        with all its branches; -1: it is not divided.
+    posture : int
+        The first has the cells of the node in this posture, the second all others; -1: they are
+        told apart by gamma.
+    gamma : float rad
+        The first has the cells whose middle is at most half a turn below it, or at it.
+    """
+
+    stages: tuple[Stage, ...]
+    y: Array | None = None
+    multipliers: Array | None = None
+    node: int = -1
+    posture: int = -1
+    gamma: float = 0.0
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Certificate:
     """Proof of a lower bound on the cost of every motion along a contour.
 
@@ -176,10 +218,14 @@ class Certificate:
         The bound as stated: `ALLOWANCE` times the plan's cost below the computed one.
     stages : tuple of Stage
         The first covers all motions, each further one those that the stage before leaves.
+    branches : tuple of Branch
+        Parts of the motions that the last stage leaves, the first one all of them; none: they are
+        not divided.
     """
 
     bound: float
     stages: tuple[Stage, ...]
+    branches: tuple[Branch, ...] = ()
 
     __repr__ = short_repr
 

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.auditor.acceleration import most_accelerations
-from kerfpath.auditor.cover import DEEPEST_CELL, Places, Reachable, covered
-from kerfpath.auditor.enclosure import POSTURES
+from kerfpath.auditor.cover import DEEPEST_CELL, TURN, Places, Reachable, covered, one_interval
+from kerfpath.auditor.enclosure import POSTURES, linear_minimum
 from kerfpath.auditor.jets import UNIT
-from kerfpath.auditor.steps import Rates, candidates, least_value, linked, reduced_costs, steps_on
+from kerfpath.auditor.steps import (
+    Rates,
+    candidates,
+    least_step,
+    least_value,
+    linked,
+    reduced_costs,
+    steps_on,
+)
 from kerfpath.auditor.table import Check
-from kerfpath.certificate import BASE, Certificate, Stage
+from kerfpath.certificate import BASE, Branch, Certificate, Stage
 from kerfpath.errors import CertificateRefused, InputError
 from kerfpath.plans import Plan
 
@@ -29,6 +37,10 @@ EVEN = 1e-6
 MOST_HELD = 16_000_000
 """Number of steps whose costs are kept, 16 bytes each; other costs are computed twice."""
 Costs = tuple[NDArray[np.int32], NDArray[np.int32], Array]
+MOST_BRANCHES = 400
+"""Most branches of a certificate."""
+SURE = 1e-9
+"""rad: by how much the other way round is at least too far."""
 LARGEST = 1e12
 """Largest value or slope of a potential."""
 COST_ROUNDING = 1e-9
@@ -87,7 +99,7 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
     Parameters
     ----------
     certificate : Certificate
-        Only its cells, potentials and multipliers are used.
+        Only its cells, potentials, multipliers and branches are used.
     plan : Plan
 
     Raises
@@ -96,22 +108,173 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
         The certificate does not fit the plan or does not cover all motions, or certificates do not
         apply to such a plan.
     """
-    where, every, change = certificate_inputs(plan)
     if not certificate.stages:
         raise CertificateRefused("it has no stage")
-    K, n = plan.q.shape
-    proved = -np.inf
-    left: Places | None = None
-    for stage in certificate.stages:
-        _require_fit(stage, K, n)
-        rates, constant = _rates(stage, every, change)
-        at = covered(where, stage, left, partial(linked, rates))
+    task = _Task(*certificate_inputs(plan), plan)
+    _require_branches(certificate.branches, *plan.q.shape)
+    proved, left = _by_stages(task, certificate.stages, None)
+    if certificate.branches and proved < plan.cost:
+        assert left is not None, "there is a stage"
+        under, _ = _by_branch(task, certificate.branches, 0, left, proved)
+        proved = max(proved, under)
+    return min(proved, plan.cost)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """Where the motions of a plan's task may be, the bounds of their steps, A of (6), the plan."""
+
+    where: Reachable
+    every: Rates
+    change: Array
+    plan: Plan
+
+    __repr__ = short_repr
+
+
+def _by_stages(
+    task: _Task, stages: Sequence[Stage], left: Places | None
+) -> tuple[float, Places | None]:
+    """Return the bound that stages prove for motions through places, and the places they leave."""
+    proved, cost = -np.inf, task.plan.cost
+    for stage in stages:
+        _require_fit(stage, *task.plan.q.shape)
+        rates, constant = _rates(stage, task.every, task.change)
+        at = covered(task.where, stage, left, partial(linked, rates))
         bounds = _through(rates, at, stage) + constant
-        proved = max(proved, float(bounds.min(initial=np.inf)))
-        if proved >= plan.cost:
-            return plan.cost
-        left = at.take(bounds <= plan.cost)
-    return proved
+        proved = max(proved, _over_layers(rates.nodes, at.node, bounds))
+        if proved >= cost:
+            break
+        left = at.take(bounds <= cost)
+    return proved, left
+
+
+def _over_layers(nodes: Ints, node: Ints, bounds: Array) -> float:
+    """Return the bound on a motion, which passes a place of each node, from bounds (C,)."""
+    least = np.full(len(nodes), np.inf)
+    np.minimum.at(least, np.searchsorted(nodes, node), bounds)
+    return float(least.max())
+
+
+def _by_branch(
+    task: _Task, branches: Sequence[Branch], number: int, left: Places, known: float
+) -> tuple[float, int]:
+    """Return the bound that a branch proves for motions through places, at least `known`.
+
+    Also return the number of the branch after it and its own branches.
+    """
+    branch, cost, after = branches[number], task.plan.cost, number + 1
+    by_stages, rest = _by_stages(task, branch.stages, left)
+    assert rest is not None, "there were places"
+    known, left = max(known, by_stages), rest
+    if known < cost and branch.y is not None and branch.multipliers is not None:
+        known = max(known, _in_tube(task, left, branch.y, branch.multipliers))
+    if branch.node < 0:
+        return known, after
+    here = left.node == branch.node
+    if not here.any():
+        raise CertificateRefused(f"branches: no cell at node {branch.node}, where one is divided")
+    if branch.posture >= 0:
+        first = left.posture == branch.posture
+    else:
+        off = left.middle - branch.gamma
+        first = off - TURN * np.round(off / TURN) <= 0
+    bounds = []
+    for side in (first, ~first):
+        # A side that is known to be dear has branches that need no proof.
+        some = left.take(~here | side)
+        under, after = (
+            _by_branch(task, branches, after, some, known)
+            if known < cost and (here & side).any()
+            else (np.inf, _after(branches, after))
+        )
+        bounds.append(under)
+    return max(known, min(bounds)), after
+
+
+def _require_branches(branches: Sequence[Branch], K: int, n: int) -> None:
+    """Raise CertificateRefused unless branches fit K nodes and n joints, and each other."""
+    if not branches:
+        return
+    if len(branches) > MOST_BRANCHES:
+        raise CertificateRefused(f"branches: expected up to {MOST_BRANCHES}, got {len(branches)}")
+    if _after(branches, 0) != len(branches):
+        raise CertificateRefused("branches: expected two for each that is divided, got more")
+    for branch in branches:
+        if not branch.node < K:
+            raise CertificateRefused(f"branches: expected nodes below {K}, got {branch.node}")
+        if branch.multipliers is not None:
+            _tilt(branch.multipliers, K, n)
+        y = branch.y
+        if y is None:
+            continue
+        if y.shape != (K - 1, n) or y.dtype.kind != "f" or not (np.abs(y) <= LARGEST).all():
+            shape = f"shape {(K - 1, n)} and numbers up to {LARGEST:g}"
+            raise CertificateRefused(f"y: expected {shape}, got shape {y.shape}")
+
+
+def _after(branches: Sequence[Branch], number: int) -> int:
+    """Return the number of the branch after one and its own branches."""
+    missing = 1
+    while missing:
+        if number >= len(branches):
+            raise CertificateRefused("branches: expected two for each that is divided, got fewer")
+        missing += 1 if branches[number].node >= 0 else -1
+        number += 1
+    return number
+
+
+def _in_tube(task: _Task, left: Places, y: Array, nu: Array) -> float:
+    """Return the bound by y and nu on motions through places, on one interval at each node.
+
+    It is minus infinity if the places are in several postures or turns, too far apart, or not
+    smooth.
+    """
+    K, n = task.plan.q.shape
+    tilt = _tilt(nu, K, n)
+    found = one_interval(task.where, left) if len(np.unique(left.node)) == K else None
+    if found is None:
+        return -np.inf
+    return _by_duals(replace(task.every, tilt=tilt), *found, y, np.abs(nu) @ task.change)
+
+
+def _by_duals(rates: Rates, at: Places, moved: Array, y: Array, price: Array) -> float:
+    """Return the bound on motions with one interval of gamma at each node.
+
+    It is infinite if there is no such motion, and minus infinity if an increment of an endless
+    joint may be another one by a turn.
+
+    Parameters
+    ----------
+    rates : Rates
+        Steps between all nodes, tilted by the multipliers of (6).
+    at, moved : Places, (K-1, n) rad
+        From `one_interval`.
+    y : (K-1, n)
+        Prices of the increments; with any, the bound holds.
+    price : (K,)
+        The most that the multipliers add at each node where (6) holds.
+    """
+    K, n = at.q.shape
+    most = rates.velocity
+    if (np.abs(moved) + at.reach[1:] + at.reach[:-1] + most > TURN - SURE)[:, rates.endless].any():
+        return -np.inf
+    # The middles of a motion without turns of endless joints between them.
+    middle = at.q[0] + np.vstack([np.zeros(n), np.cumsum(moved, axis=0)])
+    force = -np.diff(y, axis=0, prepend=0.0, append=0.0)
+    curves = at.slope, at.low, at.high, at.radius, at.half
+    each = (force * middle).sum(axis=1) + linear_minimum(*curves, force)
+    sizes = np.abs(force) * (np.abs(middle) + at.reach)
+    low, high = -most.T, most.T
+    totals = []
+    for weights in (rates.weights, np.zeros(n)):
+        asked = replace(rates, weights=weights)
+        steps = least_step(asked, (y - rates.tilt).T, low, high)
+        size = float(sizes.sum() + np.abs(steps).sum() + price.sum())
+        size += float((np.abs(y - rates.tilt) * most).sum())
+        totals.append(float(each.sum() + steps.sum() - price.sum()) - 64 * UNIT * K * n * size)
+    cost, none = totals
+    return np.inf if none > 0 else cost
 
 
 def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
@@ -218,17 +381,23 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
     nu = stage.multipliers
     if nu is None:
         return rates, 0.0
+    tilt = _tilt(nu, K, n)
+    if len(nodes) < K:
+        raise CertificateRefused("multipliers: expected cells at every node")
+    size = float((np.abs(nu) @ change).sum())
+    rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
+    return replace(rates, tilt=tilt), -size - 4 * UNIT * (K + n) * rounded
+
+
+def _tilt(nu: Array, K: int, n: int) -> Array:
+    """Return what multipliers nu (K, n) of (6) add to the cost of each step (K-1, n), by joint."""
     if nu.shape != (K, n) or nu.dtype.kind != "f":
         raise CertificateRefused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
     if not (np.abs(nu) <= LARGEST).all():
         raise CertificateRefused(f"multipliers: expected numbers up to {LARGEST:g}")
     if nu[0].any() or nu[-1].any():
         raise CertificateRefused("multipliers: expected zeros at the first node and the last")
-    if len(nodes) < K:
-        raise CertificateRefused("multipliers: expected cells at every node")
-    size = float((np.abs(nu) @ change).sum())
-    rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
-    return replace(rates, tilt=nu[:-1] - nu[1:]), -size - 4 * UNIT * (K + n) * rounded
+    return np.asarray(nu[:-1] - nu[1:])
 
 
 def _through(rates: Rates, at: Places, stage: Stage) -> Array:

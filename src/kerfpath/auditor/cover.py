@@ -114,6 +114,12 @@ class Places:
     def __len__(self) -> int:
         return len(self.node)
 
+    @property
+    def middle(self) -> Array:
+        """Gamma in the middle of each place, (C,) rad."""
+        width = TURN / (BASE * np.exp2(self.level.astype(np.float64)))
+        return np.asarray(width * (self.index + 0.5) - np.pi)
+
     def take(self, which: Ints | Bools | slice) -> Places:
         """Return a selection of the places."""
         return Places(*(getattr(self, each.name)[which] for each in fields(self)))
@@ -184,6 +190,65 @@ def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linke
     for size in (found.radius, found.reach):
         size[anywhere] = HALF_TURN
     return found
+
+
+def one_interval(where: Reachable, places: Places) -> tuple[Places, Array] | None:
+    """Return one interval of gamma at each of the M nodes of places, which holds them all.
+
+    Also return the differences (M-1, n) rad of its joints in the middle from node to node, for
+    endless joints the short way round. None if the places of a node are in several postures or on
+    several turns, or their joints are not a smooth function of gamma on the whole interval.
+    """
+    nodes, layer = np.unique(places.node, return_inverse=True)
+    M, n = len(nodes), len(where.endless)
+    posture, middle, half = np.empty(M, np.int64), np.empty(M), np.empty(M)
+    if not places.smooth.all():
+        return None
+    for k in range(M):
+        at = np.flatnonzero(layer == k)
+        posture[k] = places.posture[at[0]]
+        if (places.posture[at] != posture[k]).any():
+            return None
+        off = places.middle[at] - places.middle[at[0]]
+        off = np.sort(off - TURN * np.round(off / TURN))
+        # From the widest gap on, once around the circle.
+        first = int(np.argmax(np.diff(off, append=off[0] + TURN))) + 1
+        off[:first] += TURN
+        low, high = off[first % len(off)], off[first - 1]
+        if first == len(off):
+            low, high = off[0], off[-1]
+        middle[k] = places.middle[at[0]] + (low + high) / 2
+        half[k] = (high - low) / 2 + places.half[at].max() + 16 * ON_TURN
+    if not (half < np.pi).all():
+        return None
+    found = enclose(where.robot, where.frames, nodes, middle, half, where.T_flange_tip)
+    own = np.arange(M), posture
+    if (found.status[own] != Status.SMOOTH).any():
+        return None
+    q, slope, low, high = (getattr(found, name)[own] for name in ("center", "slope", "low", "high"))
+    radius = found.radius[own] + ON_TURN
+    bend, h = np.maximum(np.abs(low), np.abs(high)), half[:, None]
+    reach = (np.abs(slope) * h + bend * (h * h / 2) + radius) * (1 + 1e-15)
+    # The joints of each place are those of the interval there, on the turn of the place.
+    t = places.middle - middle[layer]
+    t = (t - TURN * np.round(t / TURN))[:, None]
+    there = q[layer] + slope[layer] * t + (low + high)[layer] * (t * t / 4)
+    turn = np.round((places.q - there) / TURN)
+    own_turn = np.zeros((M, n))
+    own_turn[layer] = turn
+    ended = ~where.endless
+    sure = np.abs(places.q - there - TURN * turn) + radius[layer] + places.radius
+    sure = sure + (high - low)[layer] * (t * t / 4)
+    if (turn != own_turn[layer])[:, ended].any() or not (sure < np.pi).all():
+        return None
+    turned = np.where(where.endless, 0.0, own_turn)
+    whole = Places(
+        np.full(M, -1), nodes.astype(np.int64), np.zeros(M, np.int64), np.zeros(M, np.int64),
+        posture, turned.astype(np.int64), np.ones(M, np.bool_), q + TURN * turned, slope, low,
+        high, radius, reach, half,
+    )  # fmt: skip
+    moved = np.diff(whole.q, axis=0)
+    return whole, np.where(where.endless, moved - TURN * np.round(moved / TURN), moved)
 
 
 def _covered(

@@ -248,7 +248,7 @@ def _reduced_costs(rates: Rates, here: _Curves, there: _Curves, mu: Array, most:
 
     def offer(y: Array, cut: int | None = None) -> None:
         """Use the bound by y, for the line `cut` of the potential at the start, or for both."""
-        apart = np.minimum(y * low, y * high).sum(0) + _least_step(rates, y - mu, u_low, u_high)
+        apart = np.minimum(y * low, y * high).sum(0) + least_step(rates, y - mu, u_low, u_high)
         apart += there.least_with(y)
         for m in (0, 1) if cut is None else (cut,):
             more = apart if cut is not None else apart + here.least(here.dual[m] - y)
@@ -281,7 +281,7 @@ def _differences(rates: Rates, most: Array, here: _Curves, there: _Curves) -> tu
     return off + TURN * low, off + TURN * high
 
 
-def _least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
+def least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
     """Return a lower bound of rho(u) - z . u over steps u between low and high (n, B)."""
     w = rates.weights[:, None]
     nearest = np.clip(0.0, low, high)

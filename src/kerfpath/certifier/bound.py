@@ -10,10 +10,11 @@ from time import monotonic
 import numpy as np
 
 from kerfpath.arrays import Array, Ints, not_negative, scalar, short_repr
-from kerfpath.certificate import LEAST_GAP, Certificate, Stage, allowance
+from kerfpath.certificate import LEAST_GAP, Branch, Certificate, Stage, allowance
 from kerfpath.certifier.cells import CellMaker, CellSet, cell_maker, foldable
 from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
 from kerfpath.certifier.first_order import FirstOrder
+from kerfpath.certifier.kept_tubes import KeptTubes
 from kerfpath.certifier.lever_arms import lever_bounds
 from kerfpath.certifier.minimax import largest_step_bound
 from kerfpath.certifier.multipliers import limit_prices
@@ -169,7 +170,7 @@ def certify(
     checkable : bool
         Whether the plan gets a certificate that others can check with enclosures that may be wider.
         Then cells drop out only if their motions clearly cost too much, which is more work, and (6)
-        is left out, as the multipliers of parts do not fit into a certificate.
+        is used only along few nodes, in tubes, which the certificate then has as branches.
     most : float, optional
         Most steps from cell to cell that are bounded, see `SharedWork`; default: by the number of
         nodes. Objective "sum" only.
@@ -226,6 +227,7 @@ def certify(
         certification.count,
         certification.pairs,
         more,
+        certification.branches,
     )
 
 
@@ -237,14 +239,15 @@ def _certified(
     stages: int,
     pairs: int,
     more: str = "",
+    branches: tuple[Branch, ...] = (),
 ) -> Certified:
-    """Return the plan with its proved bound, and with the stages to keep if there are any.
+    """Return the plan with its proved bound, and with stages and branches to keep if there are any.
 
     `more` is what else it holds for, as `_also_for` says it.
     """
     bound = max(best - allowance(gap, checkable=kept is not None) * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
-    certificate = None if kept is None else Certificate(bound=bound, stages=kept)
+    certificate = None if kept is None else Certificate(bound=bound, stages=kept, branches=branches)
     proof = replace(plan.proof, bound=bound, gap=reached, certificate=certificate)
     return Certified(
         plan=replace(plan, proof=proof),
@@ -330,6 +333,7 @@ class _Certification:
             self.first_order.add(int(plan.posture[0]), plan.gamma, plan.increments)
         self.at_node = 0.0  # cells of level 0
         self.stages: list[Stage] = []
+        self.branches: tuple[Branch, ...] = ()
         self.plan, self.checkable, self.refined = plan, checkable, refined
         self.by_fewer = 0.0  # the bound by fewer nodes; a stage that proves less lacks finer cells
         self.potential = 0.0  # what it is expected to reach at the first layer
@@ -340,7 +344,7 @@ class _Certification:
         """Run stages, and divide motions, until the gap is reached or the work is spent."""
         left = self._stages_until_stalled()
         if left is not None and self.best < self.target and not self._spent(self.pairs):
-            self._divide(left)
+            (self._divide_kept if self.checkable else self._divide)(left)
 
     def _stages_until_stalled(self) -> CellSet | None:
         """Run stages; return the cells that are left if their motions are to be divided."""
@@ -356,8 +360,7 @@ class _Certification:
                 result = result.floored()
             gained, cells = self._take(result), result.cells
             self.potential = min(alone, self.best) if fresh else self.best
-            clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.grain))
-            live = result.through <= self.cost * (1 + clearly)
+            live = result.through <= self.cost * (1 + self._clearly(cells))
             if not self.checkable:
                 live = np.logical_or.reduce(result.groups(live, self.maker))
             self._lower_goal(result)
@@ -376,7 +379,7 @@ class _Certification:
             reached = not low.any() or (not self.checkable and self.best >= self.goal)
             if not reached and fits and self._priced and (late or vain):
                 return cells.take(live)
-            divisible = self._few and (self._patient or self._priced)
+            divisible = self._few and (self.checkable or self._patient or self._priced)
             last = cells.take(live) if divisible else None
             if reached or len(cells) * left > MOST_CELLS or self._spent(ahead):
                 self._finish(result)
@@ -402,6 +405,10 @@ class _Certification:
             else:
                 cells = self.maker.divided(cells.take(kept), which[kept])
 
+    def _clearly(self, cells: CellSet) -> Array:
+        """Return the share of the plan's cost (C,) by which motions clearly cost more, by cell."""
+        return np.asarray(self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.grain)))
+
     def _solved(self, cells: CellSet, fresh: bool) -> StageResult:
         """Return the bounds of a stage, without steps that only motions dearer than the plan take.
 
@@ -417,9 +424,10 @@ class _Certification:
     @cached_property
     def _few(self) -> bool:
         """Whether the layers are so few that motions are divided into tubes."""
-        other = self.checkable or self.maker.more or self.plan.feed is not None
-        most = SEVERAL if self._patient else FEW
-        return not other and self.last > 1 and len(self._layers) <= most
+        other = self.maker.more or self.plan.feed is not None
+        most = SEVERAL if self._patient and not self.checkable else FEW
+        every = not self.checkable or (len(self._layers) == self.last + 1 and self._binding)
+        return not other and every and self.last > 1 and len(self._layers) <= most
 
     @property
     def _patient(self) -> bool:
@@ -480,12 +488,17 @@ class _Certification:
         return self.steps.layers(0, self.last)
 
     @cached_property
+    def _binding(self) -> bool:
+        """Whether the plan is at a limit of acceleration."""
+        share = np.abs(self.plan.acceleration_share)
+        return bool((share > AT_LIMIT * self.plan.settings.eta_a).any())
+
+    @cached_property
     def _priced(self) -> bool:
         """Whether (6) adds more to the cost of the plan than the gap that may be left."""
         if self.checkable or self.maker.more or self.plan.feed is not None:
             return False
-        share = np.abs(self.plan.acceleration_share)
-        if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
+        if not self._binding:
             return False
         posture = int(np.bincount(self.plan.posture).argmax())
         nodes = np.arange(self.last + 1)
@@ -552,6 +565,30 @@ class _Certification:
         )
         bound = tubes.bound(parts.left)
         self._took(tubes, min(bound, self.target))
+
+    def _divide_kept(self, cells: CellSet) -> None:
+        """Continue in tubes, at all nodes, and keep their proof."""
+        self.nodes = self._layers
+        cells = self._with_nodes(cells, COARSE)
+        before, posture = self.pairs, int(np.bincount(self.plan.posture).argmax())
+        made = (self._prices(self.nodes, self.plan.gamma, posture, NARROW, m) for m in DEAREST)
+
+        def enough(pairs: int, held: int) -> bool:
+            return held > MOST_CELLS or self._spent(before + pairs)
+
+        tubes = KeptTubes(
+            self.maker,
+            self.steps,
+            self.nodes,
+            cost=self.cost,
+            target=self.target,
+            enough=enough,
+            clearly=self._clearly,
+            prices=[nu for nu in made if nu is not None],
+        )
+        bound = min(tubes.bound([(self.best, cells)]), self.target)
+        self._took(tubes, bound)
+        self.branches = tubes.branches
 
     def _cheaper(self, course: Course) -> float:
         """Take the plan that a course leads to if it costs less; return its cost, or infinity."""

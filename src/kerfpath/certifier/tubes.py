@@ -22,12 +22,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import count
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.multipliers import Lengths
@@ -56,7 +56,7 @@ PROGRAM_PAIRS = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
+class Found:
     """What a program found: gamma (M,) and duals.
 
     Without a solution there are duals only, which may prove that there is none.
@@ -97,7 +97,7 @@ class _Program:
         self._rows, self._right = sparse.csr_array(sparse.vstack(rows)), np.concatenate(right)
         self._cost = np.concatenate([np.zeros(first), np.ones(lengths)])
 
-    def solve(self, tube: Tube) -> _Found | None:
+    def solve(self, tube: Tube) -> Found | None:
         """Return what the program of a tube finds; None if the solver fails."""
         link, wide = self._of.of(tube)
         tied = 0 if tube.tied is None else len(tube.tied[1])
@@ -107,20 +107,34 @@ class _Program:
         if not np.isfinite(found.dual).all():
             return None
         t = found.x[: len(tube.half)]
-        return _Found(
+        return Found(
             solved=found.solved and bool(np.isfinite(t).all()),
             duals=self._of.duals(found.dual, tube),
             gamma=tube.middle + tube.half * np.clip(t, -1.0, 1.0),
         )
 
 
+class Split(NamedTuple):
+    """How cells are divided: those of a layer in a posture and the others, or by gamma (-1)."""
+
+    layer: int
+    posture: int
+    gamma: float
+    first: Bools
+    """(C,): which cells of the layer are on the first side."""
+
+
 @dataclass(slots=True, eq=False)
-class _Part:
-    """Cells of a tube, or of several, how often it was bounded undivided, and known duals."""
+class Part:
+    """Cells of a tube, or of several, how often it was bounded undivided, and known duals.
+
+    Where the proof is kept, it has a number among the branches.
+    """
 
     cells: CellSet
     rounds: int = 0
-    duals: _Found | None = None
+    duals: Found | None = None
+    number: int = 0
 
     __repr__ = short_repr
 
@@ -160,7 +174,7 @@ class Tubes:
         self._free = replace(steps, weight=np.zeros_like(steps.weight))
         self._cost, self._target, self._enough = cost, target, enough
         self._number, self._held = count(), 0
-        self._open: list[tuple[float, int, _Part]] = []
+        self._open: list[tuple[float, int, Part]] = []
         self._closed = cost
         self._cheaper, self._tried = cheaper, cost * (1 - SAME_COST)
         self.pairs, self.count = 0, 0
@@ -171,7 +185,7 @@ class Tubes:
         Each of the sets is a known lower bound, and cells of the layers.
         """
         for known, cells in sets:
-            self._wait(known, _Part(cells))
+            self._wait(known, Part(cells))
         while self._open and self._open[0][0] < min(self._target, self._closed):
             if self._enough(self.pairs, self._held):
                 break
@@ -180,11 +194,11 @@ class Tubes:
             self._divide(part, known)
         return min(self._closed, self._open[0][0]) if self._open else self._closed
 
-    def _wait(self, known: float, part: _Part) -> None:
+    def _wait(self, known: float, part: Part) -> None:
         heappush(self._open, (known, next(self._number), part))
         self._held += len(part.cells)
 
-    def _divide(self, part: _Part, known: float) -> None:
+    def _divide(self, part: Part, known: float) -> None:
         """Bound a tube, and queue what is left of it, in parts, if it may cost less."""
         self.count += 1
         cells = self._finer(part.cells)
@@ -225,7 +239,7 @@ class Tubes:
             if self._close(least):
                 continue
             if lost and part.rounds < ROUNDS:
-                self._wait(least, _Part(rest, part.rounds + 1, duals))
+                self._wait(least, Part(rest, part.rounds + 1, duals))
                 continue
             halves = self._halves(rest, tube, found)
             if not halves and (rest.level < DEEPEST).any():
@@ -233,7 +247,7 @@ class Tubes:
             elif not halves:
                 self._closed = min(self._closed, least)
             for each in halves:
-                self._wait(least, _Part(each, duals=duals))
+                self._wait(least, Part(each, duals=duals))
 
     def _look_at(self, gamma: Array, cells: CellSet) -> None:
         """Take the plan of a motion with gamma (M,) in the posture of cells if it costs less."""
@@ -282,12 +296,12 @@ class Tubes:
             return None
         return enclosed(self._maker, self._steps.endless, self._nodes, cells, (low, high))
 
-    def _solved(self, tube: Tube) -> _Found | None:
+    def _solved(self, tube: Tube) -> Found | None:
         self.pairs += PROGRAM_PAIRS * len(self._nodes)
         return self._program.solve(tube)
 
     def _stages(
-        self, cells: CellSet, low: Array, high: Array, tube: Tube | None, found: _Found | None
+        self, cells: CellSet, low: Array, high: Array, tube: Tube | None, found: Found | None
     ) -> list[StageResult]:
         """Return stages on the cells, with the duals of the tube and of a part of it."""
         if tube is None or found is None:
@@ -321,14 +335,22 @@ class Tubes:
         self.pairs += result.pairs
         return result
 
-    def _halves(self, cells: CellSet, tube: Tube | None, found: _Found | None) -> list[CellSet]:
+    def _halves(self, cells: CellSet, tube: Tube | None, found: Found | None) -> list[CellSet]:
         """Return the cells on either side of the middle of a node, or none if it has one alone."""
+        split = self._split(cells, tube, found)
+        if split is None:
+            return []
+        layer = np.searchsorted(self._nodes, cells.node)
+        return [cells.take((layer != split.layer) | side) for side in (split.first, ~split.first)]
+
+    def _split(self, cells: CellSet, tube: Tube | None, found: Found | None) -> Split | None:
+        """Return how cells are divided in two at a layer; None if each layer has one alone."""
         layer = np.searchsorted(self._nodes, cells.node)
         for k in range(len(self._nodes)):
-            here = layer == k
-            postures = np.unique(cells.posture[here])
+            postures = np.unique(cells.posture[layer == k])
             if len(postures) > 1:
-                return [cells.take(~here | (cells.posture == p)) for p in postures]
+                one = int(postures[0])
+                return Split(k, one, 0.0, cells.posture == one)
         low, high = hull(cells, self._nodes)
         middle, _ = cell_bounds(cells.level, cells.index)
         off = middle - ((low + high) / 2)[layer]
@@ -337,13 +359,13 @@ class Tubes:
         several = np.bincount(layer[left], minlength=len(low)) > 0
         several &= np.bincount(layer[~left], minlength=len(low)) > 0
         if not several.any():
-            return []
+            return None
         score = (high - low) ** 2
         if tube is not None and found is not None:
             pull = tube.pull(found.duals)
             score = pull + 1e-3 * score * pull.max() / score.max() + 1e-12 * score
         k = int(np.argmax(np.where(several, score, -1.0)))
-        return [cells.take((layer != k) | side) for side in (left, ~left)]
+        return Split(k, -1, float(low[k] + high[k]) / 2, left)
 
 
 def _least(cells: CellSet) -> float:

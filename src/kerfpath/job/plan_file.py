@@ -10,7 +10,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from types import UnionType
@@ -38,7 +38,7 @@ from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.auditor import BOUND, Check, Level, Unit
 from kerfpath.cell import Cell, caveats
-from kerfpath.certificate import Certificate, Stage
+from kerfpath.certificate import Branch, Certificate, Stage
 from kerfpath.comfort import MEASURES
 from kerfpath.contour import KINDS, Contour
 from kerfpath.dynamics import Load
@@ -46,7 +46,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.job.format import AuditTable, ProgramTable, Tolerances, contours_of, sheet_of
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
-from kerfpath.plans import Feed, Plan, Proof, TransferMove
+from kerfpath.plans import Explored, Feed, Plan, Proof, TransferMove
 from kerfpath.post import ProgramOptions, require_one_set
 from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
@@ -241,11 +241,35 @@ class StageData(TypedDict):
     multipliers: ArrayData | None
 
 
+class BranchData(TypedDict):
+    """A part of the motions, as in `kerfpath.certificate.Branch`."""
+
+    stages: list[StageData]
+    y: ArrayData | None
+    multipliers: ArrayData | None
+    node: int
+    posture: int
+    gamma: float
+
+
 class CertificateData(TypedDict):
     """The certificate that proves a bound."""
 
     bound: float
     stages: list[StageData]
+    branches: NotRequired[list[BranchData]]
+
+
+class ExploredData(TypedDict):
+    """What the search followed and dropped, see `kerfpath.plans.Explored`."""
+
+    valleys: dict[str, int]
+    all_valleys: bool
+    screened: int
+    refined: int
+    dearer: int
+    alike: int
+    left: int
 
 
 class PlanData(TypedDict):
@@ -267,6 +291,7 @@ class PlanData(TypedDict):
     certificate: NotRequired[CertificateData]
     approach: NotRequired[MoveData]
     retreat: NotRequired[MoveData]
+    explored: NotRequired[ExploredData]
     criteria: CriteriaData
     feed: FeedData | None
     counts: dict[str, int]
@@ -541,14 +566,34 @@ LARGEST_ARRAY = 1 << 30
 
 def certificate_entry(certificate: Certificate) -> CertificateData:
     """Return the plan.json entry of a certificate."""
-    stages = [
-        {
-            name: None if (part := getattr(stage, name)) is None else _packed(part, kind)
-            for name, kind in TYPES.items()
-        }
-        for stage in certificate.stages
-    ]
-    return {"bound": certificate.bound, "stages": cast(list[StageData], stages)}
+    entry: CertificateData = {
+        "bound": certificate.bound,
+        "stages": [_stage_entry(stage) for stage in certificate.stages],
+    }
+    if certificate.branches:
+        kind = TYPES["multipliers"]
+        entry["branches"] = [
+            {
+                "stages": [_stage_entry(stage) for stage in branch.stages],
+                "y": None if branch.y is None else _packed(branch.y, kind),
+                "multipliers": (
+                    None if branch.multipliers is None else _packed(branch.multipliers, kind)
+                ),
+                "node": branch.node,
+                "posture": branch.posture,
+                "gamma": branch.gamma,
+            }
+            for branch in certificate.branches
+        ]
+    return entry
+
+
+def _stage_entry(stage: Stage) -> StageData:
+    entry = {
+        name: None if (part := getattr(stage, name)) is None else _packed(part, kind)
+        for name, kind in TYPES.items()
+    }
+    return cast(StageData, entry)
 
 
 def read_certificate(data: CertificateData) -> Certificate:
@@ -560,12 +605,36 @@ def read_certificate(data: CertificateData) -> Certificate:
         An array differs from its stated type or size, or from the number of cells of its stage.
     """
     return Certificate(
-        bound=data["bound"], stages=tuple(_stage(s, each) for s, each in enumerate(data["stages"]))
+        bound=data["bound"],
+        stages=_stages("certificate", data["stages"]),
+        branches=tuple(
+            _branch(f"certificate, branch {number}", each)
+            for number, each in enumerate(data.get("branches", ()))
+        ),
     )
 
 
-def _stage(number: int, data: StageData) -> Stage:
-    where = f"certificate, stage {number}"
+def _branch(where: str, data: BranchData) -> Branch:
+    kind = TYPES["multipliers"]
+    y, nu = (
+        None if packed is None else _unpacked(packed, kind, f"{where}: {name}")
+        for name, packed in (("y", data["y"]), ("multipliers", data["multipliers"]))
+    )
+    return Branch(
+        stages=_stages(where, data["stages"]),
+        y=cast(Array | None, y),
+        multipliers=cast(Array | None, nu),
+        node=data["node"],
+        posture=data["posture"],
+        gamma=data["gamma"],
+    )
+
+
+def _stages(where: str, data: list[StageData]) -> tuple[Stage, ...]:
+    return tuple(_stage(f"{where}, stage {number}", each) for number, each in enumerate(data))
+
+
+def _stage(where: str, data: StageData) -> Stage:
     arrays: dict[str, NDArray[np.generic] | None] = {}
     for name, kind in TYPES.items():
         packed = cast(ArrayData | None, data[name])  # type: ignore[literal-required]  # one of TYPES
@@ -983,6 +1052,7 @@ def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan
             bound=entry["bound"],
             gap=entry["gap"],
             certificate=None if certificate is None else read_certificate(certificate),
+            explored=Explored(**entry["explored"]) if "explored" in entry else None,
         ),
         counts=entry["counts"],
         feed=None if entry["feed"] is None else Feed(**entry["feed"]),
@@ -1080,6 +1150,7 @@ def plan_entry(
         **({} if shown is None else {"certificate": certificate_entry(shown)}),
         **({} if plan.approach is None else {"approach": _move_entry(plan.approach, plan.robot)}),
         **({} if plan.retreat is None else {"retreat": _move_entry(plan.retreat, plan.robot)}),
+        **({} if proof.explored is None else {"explored": asdict(proof.explored)}),
         "criteria": {
             **apart("displacement", criteria.displacement, plan.robot),
             **apart("largest_increment", criteria.largest_increment, plan.robot),

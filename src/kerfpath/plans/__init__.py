@@ -6,6 +6,7 @@ from kerfpath.plans.plan import OF_BOUND as OF_BOUND
 from kerfpath.plans.plan import PLACING as PLACING
 from kerfpath.plans.plan import STILL as STILL
 from kerfpath.plans.plan import Criteria as Criteria
+from kerfpath.plans.plan import Explored as Explored
 from kerfpath.plans.plan import Feed as Feed
 from kerfpath.plans.plan import JointMotion as JointMotion
 from kerfpath.plans.plan import Plan as Plan

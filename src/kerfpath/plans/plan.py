@@ -135,6 +135,60 @@ def in_model(motion: JointMotion, names: Sequence[str], model: Any) -> JointMoti
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Explored:
+    """What a search over continuous gamma followed, and what it dropped.
+
+    The bottom of a valley is a sample that the best course through it by (5) alone costs less than
+    through its neighbours in gamma. Courses through valleys are refined, or screened before: many
+    are brought near the limits at once, and the best are refined.
+
+    Parameters
+    ----------
+    valleys : mapping of str to int
+        Number of valleys followed in each posture, by its number, or "several" for those that
+        change posture.
+    all_valleys : bool
+        Whether all valleys were explored, up to a number along the same nodes; otherwise only the
+        cheapest were followed, as the best motion costs hardly more than the cheapest course by (5)
+        alone, or as such tasks are searched by beams.
+    screened : int
+        Number of courses screened: through valleys, smoothed, of constant gamma, and changed ones.
+    refined : int
+        Number of motions refined.
+    dearer : int
+        Number of motions that were not refined because they cost more than the best one by more
+        than refinements gain.
+    alike : int
+        Number of those that were not refined because a refined one is nearly the same.
+    left : int
+        Number of those that were not refined, and of valleys not followed, for want of work.
+    """
+
+    valleys: Mapping[str, int]
+    all_valleys: bool
+    screened: int
+    refined: int
+    dearer: int
+    alike: int
+    left: int
+
+    @property
+    def words(self) -> str:
+        """The numbers in a sentence."""
+        places = ", ".join(
+            f"{count} in {'several postures' if where == 'several' else f'posture {where}'}"
+            for where, count in self.valleys.items()
+        )
+        which = "all valleys" if self.all_valleys else "the cheapest valleys"
+        begun = f"{which} followed ({places})" if places else "no valley followed"
+        return (
+            f"{begun}, {self.screened} courses screened, {self.refined} motions refined; not "
+            f"refined: {self.dearer} that cost more than the best, {self.alike} like a refined "
+            f"one, {self.left} for want of work"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
     """What is proved about a plan.
 
@@ -154,6 +208,8 @@ class Proof:
         Largest possible distance of the plan from the best motion: (cost - bound) / cost.
     certificate : Certificate or None
         Proof of the bound, see `kerfpath.certificate`.
+    explored : Explored or None
+        What the search over continuous gamma followed and dropped; None if there was none.
     """
 
     optimal: bool
@@ -162,6 +218,7 @@ class Proof:
     bound: float | None = None
     gap: float | None = None
     certificate: Certificate | None = None
+    explored: Explored | None = None
 
     __repr__ = short_repr
 
