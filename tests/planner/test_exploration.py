@@ -201,3 +201,20 @@ def test_the_fastest_speed_passes_a_singularity_only_if_joints_move_evenly(arm):
         for moves in ("joint", "linear")
     )
     assert even > 1.15 * straight
+
+
+def test_what_is_followed_and_dropped_is_counted(circle, arm, tool, placement, change_effort):
+    nodes = circle.resample(count=31)
+    where = {"tool": tool, "placement": placement, "speed": 0.45, "certify": None}
+    cheapest = plan(nodes, arm, **where).proof.explored
+    change_effort(worth_exploring=-1.0)
+    told = plan(nodes, arm, **where).proof.explored
+    assert told.all_valleys
+    assert sum(told.valleys.values()) >= sum(cheapest.valleys.values()) > 0
+    assert {*told.valleys} <= {*map(str, range(arm.postures)), "several"}
+    assert told.screened > told.refined > 0
+    assert min(told.dearer, told.alike, told.left) >= 0
+    assert told.words.startswith("all valleys followed (")
+    assert f"{told.refined} motions refined" in told.words
+    one = plan(nodes, arm, postures=(1,), **where).proof.explored
+    assert set(one.valleys) == {"1"}

@@ -166,6 +166,8 @@ def _random_model(rng, metric, *, cap=np.inf, free=1, varies=False):
         weight=rng.uniform(0.5, 2, n),
         metric=metric,
         cap=cap,
+        gamma=np.zeros(K),
+        goals=(),
         acceleration=LinearAcceleration(np.empty((0, n)), np.empty(0, int), np.empty((0, n, free))),
     )
     dq = np.diff(q, axis=0)

@@ -272,6 +272,7 @@ def cut_entry(cut: CutResult) -> dict[str, object]:
         "bound": cut.plan.proof.bound,
         "gap": cut.plan.proof.gap,
         "proof": cut.plan.proof.statement,
+        "explored": None if cut.plan.proof.explored is None else asdict(cut.plan.proof.explored),
         "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
         "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),

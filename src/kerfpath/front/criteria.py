@@ -14,6 +14,7 @@ from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
 from kerfpath.front.problem import (
+    ROOM,
     Criterion,
     Gap,
     ParetoProblem,
@@ -25,6 +26,7 @@ from kerfpath.kernels.metric import increments
 from kerfpath.options import PlanOptions
 from kerfpath.planner import longest_step
 from kerfpath.plans import PLACING, Plan
+from kerfpath.refiner import Goal, GoalKind
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 
@@ -34,9 +36,6 @@ ROUNDING = 1e-9
 """Share by which limits are widened against rounding."""
 TRIES = 8
 """Number of windows tried to find one with a pose of every node before a run uses it."""
-ROOM = 1e-8
-"""rad, and share of a limit: by how much windows and shares are wider than in the motion that they
-hold. A refinement leaves as much free, so that it begins within them and ends as good."""
 
 
 class PerJoint(Criterion):
@@ -44,6 +43,8 @@ class PerJoint(Criterion):
 
     field: ClassVar[str]
     """Its name in `kerfpath.plans.Criteria`."""
+    kind: ClassVar[GoalKind]
+    """The kind of its goal."""
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         values: Array = getattr(plan.criteria, self.field)
@@ -58,18 +59,24 @@ class PerJoint(Criterion):
         weights[self.joint] = problem.unbounded.weights[self.joint]
         return replace(problem.unbounded, weights=freeze(weights))
 
+    def goal(self, value: float, problem: ParetoProblem) -> Goal:
+        velocity, _ = problem.robot.speed_limits()
+        one = np.arange(len(velocity)) == self.joint
+        weight = 1 / velocity if self.joint is None else one.astype(np.float64)
+        return Goal(kind=self.kind, weight=freeze(weight), price=1.0, most=value)
+
 
 class Displacement(PerJoint):
     """Total displacement (7); the unbounded run is best for all joints together."""
 
-    field = "displacement"
+    field, kind = "displacement", "way"
     exact_anchor = aimed = True
 
 
 class Increment(PerJoint):
     """Largest increment (8)."""
 
-    field = "largest_increment"
+    field, kind = "largest_increment", "step"
     exact_anchor = aimed = True
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
@@ -80,7 +87,7 @@ class Increment(PerJoint):
 class Range(PerJoint):
     """Coordinate range (9), bounded by windows on the joints."""
 
-    field = "range"
+    field, kind = "range", "span"
     bounded = True
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
@@ -149,10 +156,29 @@ class Range(PerJoint):
         return otherwise
 
 
-class Velocity(Criterion):
+class Peak(Criterion):
+    """A largest share of a limit, of any joint."""
+
+    kind: ClassVar[GoalKind]
+    """The kind of its goal."""
+
+    def usable(self, problem: ParetoProblem) -> float:
+        """Return the share of the limit that runs may use."""
+        raise NotImplementedError  # every limit has its own
+
+    def goal(self, value: float, problem: ParetoProblem) -> Goal:
+        most = value / self.usable(problem)
+        return Goal(kind=self.kind, weight=freeze(np.zeros(0)), price=1.0, most=most)
+
+
+class Velocity(Peak):
     """Largest increment (8) of any joint, as a share of its velocity limit."""
 
     exact_anchor = bounded = aimed = True
+    kind = "velocity"
+
+    def usable(self, problem: ParetoProblem) -> float:
+        return problem.options.eta_v
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         return float(plan.criteria.peak_velocity.max())
@@ -167,17 +193,23 @@ class Velocity(Criterion):
         return replace(run, eta_v=min(run.eta_v, value * (1 + ROOM)))
 
 
-class Acceleration(Criterion):
+class Acceleration(Peak):
     """Largest second difference (6) of any joint, as a share of its acceleration limit."""
 
     exact_anchor = bounded = True
+    kind = "acceleration"
+
+    def usable(self, problem: ParetoProblem) -> float:
+        return problem.options.eta_a
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         return float(plan.criteria.peak_acceleration.max())
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         eta_a = problem.least.eta_a
-        return None if eta_a is None else replace(problem.unbounded, eta_a=eta_a * (1 + ROUNDING))
+        if eta_a is None or eta_a > problem.options.eta_a:
+            return None  # no path on the grid
+        return replace(problem.unbounded, eta_a=eta_a * (1 + ROUNDING))
 
     def bound(self, run: Subproblem, value: float, *_: object) -> Subproblem:
         return replace(run, eta_a=value)
@@ -198,8 +230,13 @@ class Speed(Criterion):
             faster.append(np.sqrt(asked.eta_a / sharpest))
         return longest_step(plan.contour) / plan.dt * float(min(faster))
 
-    def anchor(self, problem: ParetoProblem) -> Subproblem:
-        return problem.unbounded.quicker(problem.dt / problem.least.slower.dt * (1 - ROUNDING))
+    def goal(self, value: float, problem: ParetoProblem) -> Goal:
+        most = longest_step(problem.contour) / problem.dt / value
+        return Goal(kind="interval", weight=freeze(np.zeros(0)), price=1.0, most=most)
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem | None:
+        quicker = problem.dt / problem.least.slower.dt * (1 - ROUNDING)
+        return None if quicker < 1 - 2 * ROUNDING else problem.unbounded.quicker(quicker)
 
     def bound(
         self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem, *_: object
@@ -267,6 +304,9 @@ class Rotation(Criterion):
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         return float(np.ptp(np.unwrap(plan.gamma)))
+
+    def goal(self, value: float, problem: ParetoProblem) -> Goal:
+        return Goal(kind="turn", weight=freeze(np.zeros(0)), price=1.0, most=value)
 
 
 class Reversals(Criterion):

@@ -31,6 +31,7 @@ from kerfpath.planner import (
     require_rates_alone,
 )
 from kerfpath.plans import Plan, on_turns
+from kerfpath.refiner import Goal, GoalKind
 from kerfpath.robots import Robot
 from kerfpath.search import Course, Metric, ObjectiveKind, Relaxations
 from kerfpath.setup import Setup
@@ -58,7 +59,18 @@ class SubproblemData(TypedDict):
     window: list[list[float] | None]
     clearance: float
     continuous: NotRequired[bool]
+    explored: NotRequired[bool]
     begin: NotRequired[list[CourseData]]
+    goals: NotRequired[list[GoalData]]
+
+
+class GoalData(TypedDict):
+    """A goal of a refinement as JSON data, see `kerfpath.refiner.Goal`."""
+
+    kind: GoalKind
+    weight: list[float]
+    price: float
+    most: float
 
 
 class CourseData(TypedDict):
@@ -101,8 +113,13 @@ class Subproblem:
         Clearance of robot and head from all other bodies, beyond the near-miss distance.
     continuous : bool
         Whether gamma is continuous instead of on its grid.
+    explored : bool
+        Whether a continuous run explores all valleys.
     begin : tuple of Course
         Known motions from which a continuous run is refined; none: it searches everywhere.
+    goals : tuple of Goal
+        Criteria that such a refinement improves together, each held to its value, instead of the
+        objective; none: the objective.
     """
 
     objective: ObjectiveKind
@@ -113,7 +130,9 @@ class Subproblem:
     window: Array
     clearance: float = 0.0
     continuous: bool = False
+    explored: bool = False
     begin: tuple[Course, ...] = ()
+    goals: tuple[Goal, ...] = ()
 
     __repr__ = short_repr
 
@@ -181,8 +200,15 @@ class Subproblem:
         }
         if self.continuous:
             data["continuous"] = True
+        if self.explored:
+            data["explored"] = True
         if self.begin:
             data["begin"] = [course_data(course) for course in self.begin]
+        if self.goals:
+            data["goals"] = [
+                {"kind": g.kind, "weight": g.weight.tolist(), "price": g.price, "most": g.most}
+                for g in self.goals
+            ]
         return data
 
     @classmethod
@@ -200,7 +226,17 @@ class Subproblem:
             window=freeze(np.array(window)),
             clearance=data["clearance"],
             continuous=data.get("continuous", False),
+            explored=data.get("explored", False),
             begin=tuple(course_from(course) for course in data.get("begin", ())),
+            goals=tuple(
+                Goal(
+                    kind=goal["kind"],
+                    weight=freeze(np.array(goal["weight"], dtype=np.float64)),
+                    price=goal["price"],
+                    most=goal["most"],
+                )
+                for goal in data.get("goals", ())
+            ),
         )
 
 
@@ -348,7 +384,15 @@ def plan_run(
         cell = cell and cell.with_endless(narrowed.endless)
     there = replace(setup, robot=narrowed, cell=cell)
     if run.begin:
-        made = refined_motion(contour, there, asked, speed=speed, graph=graph, begin=run.begin)
+        made = refined_motion(
+            contour,
+            there,
+            asked,
+            speed=speed,
+            graph=graph,
+            begin=run.begin,
+            goals=run.goals,
+        )
     else:
         empty = robot.externals and not graph.has_poses_throughout
         made = best_motion(
@@ -358,6 +402,7 @@ def plan_run(
             speed=speed,
             graph=None if empty else graph,
             phase=phase,
+            explored=run.explored,
         )
     limits = replace(made.settings, eta_v=options.eta_v, eta_a=options.eta_a)
     return replace(_widened(made, robot) if windowed else made, settings=limits)
@@ -411,6 +456,11 @@ def _widened(made: Plan, robot: Robot) -> Plan:
 
 DIGITS = 12
 """Significant digits of a criterion."""
+ROOM = 1e-8
+"""rad, and share of a limit: by how much windows and shares are wider than in the motion that they
+hold. A refinement leaves as much free, so that it begins within them and ends as good."""
+SMALLEST, TINY = 0.01, 1e-9
+"""Share of the scale of a criterion that a value counts as at least when it is traded, and of 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -475,6 +525,13 @@ class Criterion:
         subproblem is unchanged where the criterion cannot be bounded.
         """
         return run
+
+    def goal(self, value: float, problem: ParetoProblem) -> Goal | None:
+        """Return the goal of a refinement that is to be no worse than a value, at a price of 1.
+
+        None where refinements cannot trade this criterion.
+        """
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -607,6 +664,27 @@ class ParetoProblem:
             run = criterion.hold(run, float(loss) * criterion.sense, solution.spans, self)
         return run
 
+    def refining(self, solution: Solution, begin: tuple[Course, ...], scale: Array) -> Subproblem:
+        """Return a run that improves a plan in all criteria together, from known motions.
+
+        None gets worse; criteria that refinements cannot trade are bounded where that is possible.
+        The price of a criterion is 1 for its whole value, which counts as at least `SMALLEST` of
+        `scale` (C,). If no criterion can be traded, the run is that of `as_good`.
+        """
+        run, goals = replace(self.unbounded, continuous=True, begin=begin), list[Goal]()
+        losses = zip(self.criteria, solution.losses, scale, strict=True)
+        for criterion, loss, size in losses:
+            goal = criterion.goal(value := float(loss) * criterion.sense, self)
+            if goal is None:
+                run = criterion.hold(run, value, solution.spans, self)
+                continue
+            least = goal.most * SMALLEST * size / max(abs(value), TINY)
+            price = goal.price / max(goal.most, least, TINY)
+            goals.append(replace(goal, price=price, most=goal.most * (1 + ROOM) + TINY))
+        if not goals:
+            return replace(self.as_good(solution), continuous=True, begin=begin)
+        return replace(run, goals=tuple(goals))
+
     @cached_property
     def _aim(self) -> Subproblem | None:
         """The run that minimises the only criterion that cannot be bounded, if there is just one.
@@ -626,7 +704,8 @@ class ParetoProblem:
         Raises
         ------
         NoFeasiblePath
-            The `first` run, which has the full limits, has no path, so no other run can have one.
+            The `first` run, which has the full limits, has no path, and all runs are on the grid,
+            so that no other run can have one.
         """
         try:
             made = plan_run(
@@ -638,11 +717,11 @@ class ParetoProblem:
                 graph=self.graph,
             )
         except NoFeasiblePath as broken:
-            if first:
+            if first and not self.continuous:
                 message = (
-                    f"{broken}; this run had the full limits, so no run can have a plan. Runs use "
-                    "the grid of the rotation: if kerfpath plan finds a motion by refinement, "
-                    "choose a finer gamma_step_deg or a lower speed here"
+                    f"{broken}; this run had the full limits, so no run can have a plan. All runs "
+                    "use the grid of the rotation: if kerfpath plan finds a motion by refinement, "
+                    'choose a finer gamma_step_deg, a lower speed or method "continuous" here'
                 )
                 raise broken.with_message(message) from None
             counts = broken.counts
@@ -651,7 +730,12 @@ class ParetoProblem:
             if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"
-        wrong = full_audit(made, cell=self.setup.cell) if self.audit is None else self.audit(made)
+        moved = self.options.interpolation
+        wrong = (
+            full_audit(made, cell=self.setup.cell, interpolation=moved)
+            if self.audit is None
+            else self.audit(made)
+        )
         return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
 
     def evaluate(self, made: Plan) -> Evaluation:

@@ -264,12 +264,17 @@ class AdaptiveRuns:
     def propose(self, front: Sequence[Solution], scale: Array) -> Subproblem:
         """Return the next run, given the front (at least one plan) and the scale (C,)."""
         self._proposed += 1
-        front = [replace(each, run=replace(each.run, begin=())) for each in front]
+        front = [replace(each, run=self._searched(each)) for each in front]
         if self._proposed % RANDOM:
             claim, gap = max(self._gaps(front, scale), key=lambda claimed: claimed[0])
             if claim > 0:
                 return self._between(gap)
         return self._varied(front[int(self._rng.integers(len(front)))].run)
+
+    def _searched(self, solution: Solution) -> Subproblem:
+        """Return the run of a solution, or one that searches for what a refinement was held to."""
+        run = self._problem.as_good(solution) if solution.run.goals else solution.run
+        return replace(run, begin=(), explored=False)
 
     def _gaps(self, front: Sequence[Solution], scale: Array) -> Iterator[tuple[float, Gap]]:
         """Yield the claim of every gap to the next run, and the gap."""
@@ -345,6 +350,10 @@ REFINING = 1 / 3
 """Share of the runs, the last ones, in which plans of the front are refined again."""
 NEAREST = 3
 """Plans of the front, itself included, from which each is refined again."""
+ROUNDS, SETTLED = 4, 1e-3
+"""Most times that a plan is refined again and again, and relative gain below which it is final."""
+SAME = 1e-6
+"""Share of the scale of a criterion by which plans of the front differ at least in one."""
 LEAST_ROOM = 0.1
 """Least distance of the reference beyond the worst value, as a share of the ideal value."""
 TINY = 1e-9
@@ -358,7 +367,7 @@ class FrontSearch:
     ----------
     problem : ParetoProblem
     runs : int
-        Number of runs.
+        Number of runs; refinements that are left of the plans of the front follow them.
     search : {"adaptive", "grid"}
         As in `kerfpath.pareto`.
     seed : int
@@ -381,40 +390,50 @@ class FrontSearch:
         self._begun = 0
         self._tried: set[int] = set()
         self._refined: set[int] = set()
+        self._parents: dict[int, Solution] = {}
+        self._rounds: dict[int, int] = {}
+        self._done = 0
         self._found: list[Solution] = []
         self._failures: Counter[str] = Counter()
 
     def _proposed(self) -> Iterator[Subproblem]:
         """Yield the first run, the runs for the best of each criterion, and those of the search.
 
-        Where gamma is continuous, runs alternate between on the grid and off it: the fast runs on
-        the grid show where to search.
+        If the first run has no path on the grid, all others are off it; they end if the same run
+        has no motion there either. Where gamma is continuous, runs alternate between on the grid
+        and off it: the fast runs on the grid show where to search.
         """
         problem, rng = self._problem, np.random.default_rng(self._seed)
         yield problem.unbounded
+        if not (has_grid := bool(self._found)):
+            yield _explored(problem.unbounded)
+            if not self._found:
+                return
         first = problem.first_runs()
-        beyond = [replace(run, continuous=True) for run in first] if problem.continuous else []
-        self._beginning = len(first) + len(beyond)
-        yield from [*first[1:], *beyond]
+        beyond = [_explored(run) for run in first] if problem.continuous else []
+        begin = [*first[1:], *beyond] if has_grid else beyond[1:]
+        self._beginning = self._begun + len(begin)
+        yield from begin
         plain, search = grid(first[0], rng), AdaptiveRuns(problem, first, rng)
         other = np.random.default_rng([self._seed, 1])
         off_grid = AdaptiveRuns(problem, beyond, other, continuous=True)
         while True:
             on_grid = [each for each in self._found if not each.run.continuous]
             adaptive = self._search == "adaptive"
-            run = search.propose(_front(on_grid), self._scale) if adaptive and on_grid else None
-            run = run or next(plain)
-            yield run
+            known = _front(on_grid, self._scale) if adaptive and on_grid else []
+            run = search.propose(known, self._scale) if known else next(plain)
+            if has_grid:
+                yield run
             if problem.continuous:
                 if adaptive and self._found:
-                    run = self._held() or off_grid.propose(_front(self._found), self._scale)
+                    run = self._held() or off_grid.propose(self.front, self._scale)
                 yield replace(run, continuous=True)
-            while adaptive and self._late and (again := self._refined_again()) is not None:
+            while self._late and (again := self._refined_again()) is not None:
                 yield again
 
     def _held(self) -> Subproblem | None:
         """Return a run that tries to beat a plan of the grid on the front, once for each plan."""
-        for solution in _front(self._found):
+        for solution in self.front:
             if not solution.run.continuous and solution.number not in self._tried:
                 self._tried.add(solution.number)
                 return self._problem.as_good(solution)
@@ -423,22 +442,50 @@ class FrontSearch:
     @property
     def _late(self) -> bool:
         """Whether only the runs are left in which the front is refined."""
-        return self._problem.refinable and self._begun >= self.runs * (1 - REFINING)
+        return self._refines and self._begun >= self.runs * (1 - REFINING)
+
+    @property
+    def _refines(self) -> bool:
+        """Whether plans of the front are refined again."""
+        return self._problem.refinable and self._search == "adaptive"
 
     def _refined_again(self) -> Subproblem | None:
         """Return a run that refines a plan of the front once more; None if all have been.
 
-        It begins with the plan and with those nearest to it, and stays as good in all criteria that
-        can be bounded. Plans that such a run has found come last.
+        It begins with the plan and with those nearest to it, and improves all criteria together.
+        Plans that such a run has found come last, and are refined again if it gained much.
         """
-        front = sorted(_front(self._found), key=lambda each: bool(each.run.begin))
+        front = sorted(self.front, key=lambda each: self._rounds.get(each.number, 0))
         for solution in front:
-            if solution.number not in self._refined:
+            rounds = self._rounds.get(solution.number, 0)
+            if solution.number not in self._refined and rounds < ROUNDS:
                 self._refined.add(solution.number)
+                self._parents[self._begun] = solution
                 apart = [np.abs((o.losses - solution.losses) / self._scale).max() for o in front]
                 begin = tuple(front[i].course for i in np.argsort(apart, kind="stable")[:NEAREST])
-                return replace(self._problem.as_good(solution), continuous=True, begin=begin)
+                return self._problem.refining(solution, begin, self._scale)
         return None
+
+    def _take(self, found: Solution) -> None:
+        """Add a solution; one that hardly improves the plan that it was refined from is final."""
+        self._found.append(found)
+        parent = self._parents.get(found.number)
+        if parent is not None:
+            gained = (parent.losses - found.losses) / np.maximum(np.abs(parent.losses), TINY)
+            self._rounds[found.number] = self._rounds.get(parent.number, 0) + 1
+            if gained.max() < SETTLED:
+                self._refined.add(found.number)
+
+    @property
+    def front(self) -> list[Solution]:
+        """The solutions so far that no other dominates."""
+        return _front(self._found, self._scale)
+
+    def _next(self, proposed: Iterator[Subproblem]) -> Subproblem | None:
+        """Return the next run; None if there is none until another is done."""
+        if self._begun < self.runs:
+            return next(proposed, None)
+        return self._refined_again() if self._refines and self._found else None
 
     def run(self, submit: Callable[[int, Subproblem], Callable[[], Evaluation | str]]) -> Front:
         """Do all runs, up to `ahead` of them in progress, and return the front.
@@ -454,20 +501,21 @@ class FrontSearch:
         """
         proposed = self._proposed()
         flying: deque[tuple[int, Subproblem, Callable[[], Evaluation | str]]] = deque()
-        for done in range(self.runs):
-            while len(flying) < (self._ahead if done else 1) and self._begun < self.runs:
-                run = next(proposed)
+        while True:
+            most = self._ahead if self._found else 1
+            while len(flying) < most and (run := self._next(proposed)) is not None:
                 flying.append((self._begun, run, submit(self._begun, run)))
                 self._begun += 1
+            if not flying:
+                return self._result()
             number, run, wait = flying.popleft()
             found = wait()
+            self._done += 1
             if isinstance(found, str):
                 self._failures[found] += 1
             else:
-                self._found.append(
-                    Solution(losses=found.losses, course=found.course, number=number, run=run)
-                )
-        return self._result()
+                solved = found.losses, found.course
+                self._take(Solution(losses=solved[0], course=solved[1], number=number, run=run))
 
     def _box(self) -> tuple[Array, Array]:
         """Return the ideal and the reference (C,) of the first runs, where less is better.
@@ -490,16 +538,16 @@ class FrontSearch:
         if not self._found:
             why = ", ".join(f"{why}: {number}" for why, number in failures.items())
             raise NoFeasiblePath(
-                f"contour {self._problem.contour.name!r}: none of {self.runs} runs has a plan; "
+                f"contour {self._problem.contour.name!r}: none of {self._done} runs has a plan; "
                 f"{why}",
                 proved=False,
                 node=-1,
                 counts=failures,
             )
-        front = sorted(_front(self._found), key=lambda each: (*each.losses,))
+        front = sorted(self.front, key=lambda each: (*each.losses,))
         numbers = {each.number for each in front}
         beaten = [each.losses for each in self._found if each.number not in numbers]
-        on_grid = _front([each for each in self._found if not each.run.continuous])
+        on_grid = _front([e for e in self._found if not e.run.continuous], self._scale)
         sense = np.array([criterion.sense for criterion in self._problem.criteria])
         ideal, reference = self._box()
         return Front(
@@ -513,18 +561,28 @@ class FrontSearch:
             ),
             ideal=freeze(sense * ideal),
             reference=freeze(sense * reference),
-            tried=self.runs,
+            tried=self._done,
             feasible=len(self._found),
             failures=failures,
         )
 
 
-def _front(found: list[Solution]) -> list[Solution]:
-    """Return the solutions that no other dominates; of equal ones, the first."""
+def _explored(run: Subproblem) -> Subproblem:
+    """Return a run over continuous gamma with an exploration of all valleys."""
+    return replace(run, continuous=True, explored=True)
+
+
+def _front(found: list[Solution], scale: Array) -> list[Solution]:
+    """Return the solutions that no other dominates, in the order found.
+
+    Of those that are equal to `SAME` of the scale (C,) in all criteria, only the best in the sum.
+    """
     if not found:
         return []
-    kept = moocore.is_nondominated(np.array([each.losses for each in found]))
-    return [each for each, keep in zip(found, kept, strict=True) if keep]
+    scaled = np.array([each.losses for each in found]) / scale
+    order = np.argsort(scaled.sum(axis=1), kind="stable")
+    kept = moocore.is_nondominated(np.floor(scaled[order] / SAME))
+    return [found[i] for i in np.sort(order[kept])]
 
 
 def whole_number(value: int, name: str) -> int:
@@ -593,7 +651,8 @@ def pareto(
         Names in `kerfpath.front.CRITERIA`, or in `JOINT_CRITERIA` with a joint from 1, such as
         "range_6"; docs/pareto.md says what each measures. "clearance" needs a cell.
     runs : int
-        Number of runs of the planner.
+        Number of runs of the planner. Where gamma is continuous, plans of the front that have not
+        been refined by then are refined after them.
     search : {"adaptive", "grid"}
         Search where the front is sparse, or over a plain grid of weights and eta.
     seed : int

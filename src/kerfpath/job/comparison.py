@@ -89,6 +89,7 @@ CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
     r"(proof|optimal|grid_cost|bound|gap)$": "claims about motions that are not in the file",
     r"certificate(/|$)": "the proof of a bound, which the audit checks separately",
+    r"explored(/|$)": "what the search followed and dropped",
     r"counts(/|$)": "poses that were dropped in planning",
     r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
     r"sequence/(optimal|at_least_s)$": "claims about orders that are not in the file",

@@ -20,11 +20,11 @@ from kerfpath.planner.impossible import can_be_slower, interval_of, refuse_impos
 from kerfpath.planner.on_grid import from_quickest, plan_on_grid
 from kerfpath.planner.quickest import MANY, clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
-from kerfpath.planner.starts import Starts
+from kerfpath.planner.starts import Starts, Tally
 from kerfpath.planner.statements import STOPPED
 from kerfpath.planner.subsampled import subsampled
 from kerfpath.planner.task import Task
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Explored, Plan, Proof
 from kerfpath.progress import StopEarly
 from kerfpath.refiner import Refinement
 from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch, Course
@@ -67,7 +67,7 @@ def best_motion_found(attempt: Attempt) -> Plan | None:
     found = _clear_motion(attempt.task, attempt.starts, attempt.begin)
     if found is None:
         return None
-    made = claimed(found, attempt.finder)
+    made = claimed(found, attempt.finder, attempt.starts.told)
     if attempt.starts.stopped:
         made = replace(made, proof=made.proof.also(STOPPED))
     return made
@@ -103,7 +103,7 @@ def better_motion(attempt: Attempt) -> Plan | None:
     Exploration(task.whole(), starts).run()
     if starts.best.cost_after > (1 - BETTER) * before:
         return None
-    return claimed(starts.best, attempt.finder)
+    return claimed(starts.best, attempt.finder, starts.told)
 
 
 def refined_course(attempt: Attempt, course: Course) -> Plan | None:
@@ -117,7 +117,10 @@ def refined_course(attempt: Attempt, course: Course) -> Plan | None:
         return None
     starts = Starts(task, attempt.finder)
     starts.refine_course(course, np.inf)
-    return None if starts.best is None else claimed(starts.best, attempt.finder)
+    if starts.best is None:
+        return None
+    before = attempt.starts
+    return claimed(starts.best, attempt.finder, None if before is None else before.told)
 
 
 def motion_from_grid(attempt: Attempt) -> Plan | None:
@@ -161,10 +164,13 @@ def _improved(made: Plan, finder: CollisionFreeSearch) -> Plan:
     return refine_from_random_starts(made, finder) if made.feed is None else made
 
 
-def claimed(found: Refinement, finder: CollisionFreeSearch) -> Plan:
-    """Return the plan of a motion with the claim about it."""
-    claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
-    return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+def claimed(
+    found: Refinement, finder: CollisionFreeSearch, explored: Explored | None = None
+) -> Plan:
+    """Return the plan of a motion with the claim about it, and what its search followed."""
+    claim = f"the best motion found over continuous rotation: cost {found.plan.cost:.6g}"
+    proof = Proof(optimal=False, statement=finder.claimed(claim), explored=explored)
+    return replace(found.plan, proof=proof)
 
 
 def _from_grid(
@@ -224,20 +230,22 @@ def clear_motion(
     *,
     thorough: bool = True,
     explored: bool = True,
+    tally: Tally | None = None,
 ) -> Refinement | None:
     """Return the best clear motion found; None if there is none.
 
     The value function shows whether a wider search may find a better motion; without `thorough`,
     the refined first paths are enough. Without `explored`, wider beams follow instead of all
     valleys. With very many nodes, a motion is first planned along some
-    of them, and the graph of all nodes is built only if that is not enough.
+    of them, and the graph of all nodes is built only if that is not enough. What is followed and
+    dropped is added to `tally`.
 
     Raises
     ------
     NoFeasiblePath
         A node has no pose, or the speed is proved to be much too high.
     """
-    starts = Starts(task, finder)
+    starts = Starts(task, finder, tally=tally)
     return _clear_motion(task, starts, begin, thorough=thorough, explored=explored)
 
 
@@ -251,7 +259,7 @@ def _clear_motion(
 ) -> Refinement | None:
     """Return the best clear motion found, which `starts` keep; None if there is none."""
     finder = starts.finder
-    made, least = _from_fewer_nodes(task, finder, explored=explored)
+    made, least = _from_fewer_nodes(task, finder, starts.tally, explored=explored)
     starts.start_from(made, least)
     if starts.best is not None and not starts.above(least, ENOUGH):
         return starts.best
@@ -381,7 +389,7 @@ def _search_wider(
 
 
 def _from_fewer_nodes(
-    task: Task, finder: CollisionFreeSearch, *, explored: bool
+    task: Task, finder: CollisionFreeSearch, tally: Tally, *, explored: bool
 ) -> tuple[Plan | None, float]:
     """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
@@ -394,7 +402,7 @@ def _from_fewer_nodes(
         found = (
             None
             if thin is None
-            else clear_motion(thin.task, finder.of(thin.task), explored=explored)
+            else clear_motion(thin.task, finder.of(thin.task), explored=explored, tally=tally)
         )
     except NoFeasiblePath as none:
         if thin is not None and none.closed is not None:

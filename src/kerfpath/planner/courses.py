@@ -107,6 +107,10 @@ class Courses:
         self._allowed = _postures_of(task)
         self._one_posture = s.interpolation == "linear" or s.feed == "dip"
         self._rng = np.random.default_rng(SEED)
+        self.followed: list[Course] = []
+        """Courses through valleys among those of `all`, each once."""
+        self.unfollowed = 0
+        """Number of further courses through valleys, beyond `COURSES` along the same nodes."""
 
     @property
     def value_along_few(self) -> float:
@@ -168,9 +172,14 @@ class Courses:
         if self._few // 2 > 1:
             valleys = [*valleys, self._along_all]
         courses = self._constant()
+        self.followed, self.unfollowed = [], 0
         for through, nodes in valleys:
-            for course in islice(self._through(through, nodes), COURSES):
+            each = self._through(through, nodes)
+            for course in islice(each, COURSES):
+                if not any(course.like(other) for other in self.followed):
+                    self.followed.append(course)
                 courses += varied(course)
+            self.unfollowed += sum(1 for _ in each)
         return courses
 
     def cheapest(self) -> Iterator[Course]:

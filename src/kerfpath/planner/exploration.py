@@ -12,7 +12,7 @@ import numpy as np
 
 from kerfpath.effort import current_effort
 from kerfpath.planner.courses import Courses
-from kerfpath.planner.screening import SHARP, SMOOTH
+from kerfpath.planner.screening import SHARP, SMOOTH, Stage
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
@@ -55,12 +55,20 @@ class Exploration:
     def __init__(self, task: Task, starts: Starts) -> None:
         self._starts, self._courses = starts, Courses(task)
         self._known: list[Course] = []
+        self._begun: list[Course] = []
         self._again = 0
 
     def begin(self) -> None:
         """Refine the courses through the cheapest valleys that may lead to better motions."""
+        tally = self._starts.tally
         for course in islice(self._courses.cheapest(), FIRST):
-            if not (self._is_known(course) or self._starts.is_hopeless(course)):
+            self._begun.append(course)
+            tally.follow(course)
+            if self._is_known(course):
+                tally.alike += 1
+            elif self._starts.is_hopeless(course):
+                tally.dearer += 1
+            else:
                 self._starts.refine_course(course, np.inf)
 
     @property
@@ -75,23 +83,41 @@ class Exploration:
     def run(self) -> None:
         """Screen and refine courses through all valleys; shake the best motions."""
         self._starts.explored = True
-        courses = self._courses
-        self._refine(courses.screened(courses.all(), SMOOTH, SHARP), REFINED)
+        courses, tally = self._courses, self._starts.tally
+        every = courses.all()
+        for course in courses.followed:
+            if not any(course.like(other) for other in self._begun):
+                tally.follow(course)
+        tally.left += courses.unfollowed
+        self._refine(self._screened(every, SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
             before = self._best_cost
             if self._again < AGAIN:
-                self._refine(courses.screened(courses.shaken(self._best()), SHARP), REFINED_AGAIN)
+                self._refine(self._screened(courses.shaken(self._best()), SHARP), REFINED_AGAIN)
             if self._best_cost >= (1 - SAME_END) * before:
                 break
 
+    def _screened(
+        self, courses: list[Course], *ways: tuple[Stage, ...]
+    ) -> list[tuple[float, Course]]:
+        """Return what courses are screened to each way, with scores, best first."""
+        self._starts.tally.screened += len(courses)
+        return self._courses.screened(courses, *ways)
+
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
         """Refine the best motions, at most so many, that are not known."""
-        tried = 0
-        for score, course in screened:
-            best = self._best_cost
-            if tried == most or self._again == AGAIN or score > HOPELESS * best:
+        tried, tally = 0, self._starts.tally
+        for number, (score, course) in enumerate(screened):
+            best, rest = self._best_cost, len(screened) - number
+            if score > HOPELESS * best:
+                tally.dearer += rest
                 break
-            if not self._is_known(course):
+            if tried == most or self._again == AGAIN:
+                tally.left += rest
+                break
+            if self._is_known(course):
+                tally.alike += 1
+            else:
                 tried += 1
                 self._known.append(course)
                 found = self._starts.refine_course(self._courses.closed(course), score)

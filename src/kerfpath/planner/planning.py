@@ -45,6 +45,7 @@ from kerfpath.planner.straight_moves import not_followed, remedy
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, StopEarly, no_progress
+from kerfpath.refiner import Goal
 from kerfpath.robots import Robot
 from kerfpath.search import Course, Piece, find_interrupted
 from kerfpath.setup import Setup
@@ -62,12 +63,13 @@ def best_motion(
     graph: LayeredGraph | None = None,
     phase: Callable[[str], None] | None = None,
     thorough: bool = True,
+    explored: bool = False,
 ) -> Plan:
     """Return the plan of the best motion found over continuous gamma.
 
-    It is for plans that are made in number: not certified, and not after an exploration of all
-    valleys, so that it may cost more than that of `kerfpath.plan`. Where `kerfpath.plan` would go
-    to the grid, this raises NoFeasiblePath and spends no time on a proof.
+    It is for plans that are made in number: not certified, and only if `explored` after an
+    exploration of all valleys; else it may cost more than that of `kerfpath.plan`. Where
+    `kerfpath.plan` would go to the grid, this raises NoFeasiblePath and spends no time on a proof.
 
     Parameters
     ----------
@@ -76,6 +78,8 @@ def best_motion(
     setup : Setup
     thorough : bool
         Whether wider searches follow where the value function promises a better motion.
+    explored : bool
+        Whether these explore all valleys.
 
     Raises
     ------
@@ -93,7 +97,7 @@ def best_motion(
         finder, why = CollisionFreeSearch(task), grid_reason(task)
         begin("search")
         found = (
-            None if why else clear_motion(task, finder, begin, thorough=thorough, explored=False)
+            None if why else clear_motion(task, finder, begin, thorough=thorough, explored=explored)
         )
         if found is None:
             raise NoFeasiblePath(
@@ -116,6 +120,7 @@ def refined_motion(
     speed: float | None,
     graph: LayeredGraph,
     begin: Sequence[Course],
+    goals: tuple[Goal, ...] = (),
 ) -> Plan:
     """Return the plan of the best motion that refinements from known motions lead to.
 
@@ -127,6 +132,8 @@ def refined_motion(
         Its robot has no free joints.
     begin : sequence of Course
         The motions to begin with, which need not keep the limits.
+    goals : tuple of Goal
+        Criteria that are refined instead of the objective; default: the objective.
 
     Raises
     ------
@@ -137,7 +144,7 @@ def refined_motion(
     """
     options = replace(options, certify=None)
     task = planning_task(contour, setup, options, speed=speed, graph=graph)
-    starts, limits = Starts(task, CollisionFreeSearch(task)), setup.robot.joint_limits()
+    starts, limits = Starts(task, CollisionFreeSearch(task), goals), setup.robot.joint_limits()
     for course in begin:
         starts.refine_course(course._replace(q=within(limits, course.q)), np.inf)
     if starts.best is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import alike
 from kerfpath.planner.refinements import plan_off_grid
 from kerfpath.planner.task import Task
-from kerfpath.plans import Plan, Proof, has_room
-from kerfpath.refiner import Refinement
+from kerfpath.plans import Explored, Plan, Proof, has_room
+from kerfpath.refiner import Goal, Refinement
 from kerfpath.search import ContinuousPath, Course, find_shortest
 
 FIRST_STEP = 5e-3
@@ -34,11 +34,58 @@ FREE = 1.0
 _CLAIM = Proof(optimal=False, statement="found over continuous rotation")
 
 
-class Starts:
-    """Starts of refinements, and the best motion that was reached from them."""
+@dataclass(slots=True)
+class Tally:
+    """Counts of what a search followed and dropped, as in `kerfpath.plans.Explored`."""
 
-    def __init__(self, task: Task, finder: CollisionFreeSearch) -> None:
-        self._task, self.finder = task, finder
+    valleys: dict[str, int] = field(default_factory=dict)
+    screened: int = 0
+    refined: int = 0
+    dearer: int = 0
+    alike: int = 0
+    left: int = 0
+
+    def follow(self, course: Course) -> None:
+        """Count a valley."""
+        one = int(course.posture[0])
+        where = str(one) if (course.posture == one).all() else "several"
+        self.valleys[where] = self.valleys.get(where, 0) + 1
+
+    def told(self, *, all_valleys: bool) -> Explored:
+        """Return the counts."""
+        return Explored(
+            valleys=dict(sorted(self.valleys.items())),
+            all_valleys=all_valleys,
+            screened=self.screened,
+            refined=self.refined,
+            dearer=self.dearer,
+            alike=self.alike,
+            left=self.left,
+        )
+
+
+class Starts:
+    """Starts of refinements, and the best motion that was reached from them.
+
+    Parameters
+    ----------
+    task : Task
+    finder : CollisionFreeSearch
+    goals : tuple of Goal
+        Criteria that courses are refined to instead of the objective; default: the objective.
+    tally : Tally, optional
+        Counts that it goes on with; default: new ones.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        finder: CollisionFreeSearch,
+        goals: tuple[Goal, ...] = (),
+        tally: Tally | None = None,
+    ) -> None:
+        self.tally = tally or Tally()
+        self._task, self.finder, self._goals = task, finder, goals
         self._tried: list[Plan] = []
         self.found: list[Refinement] = []
         self.best: Refinement | None = None
@@ -51,6 +98,11 @@ class Starts:
         """Motions found that keep the limits, the best one among them."""
         return self.found if self.best is None else [*self.found, self.best]
 
+    @property
+    def told(self) -> Explored:
+        """What was followed and dropped so far."""
+        return self.tally.told(all_valleys=self.explored)
+
     def above(self, value: float, share: float) -> bool:
         """Return whether the best motion costs more than (1 + share) times a value."""
         return self.best is None or self.best.cost_after > (1 + share) * value
@@ -59,6 +111,7 @@ class Starts:
         """Refine a motion that is close to the best one, whose cost is at least `least`."""
         if made is not None:
             self._tried.append(made)
+            self.tally.refined += 1
             found = refiner.refine(made, first=FIRST_STEP, least=least)
             self.best = found if found.done and self.finder.is_clear(found.plan) else None
 
@@ -69,13 +122,18 @@ class Starts:
         a path inside the limits is a guess.
         """
         plans = [self._task.plan_between(path, _CLAIM) for path in paths]
-        for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
+        order = sorted((refiner.promise(plan), i) for i, plan in enumerate(plans))
+        for number, (promised, i) in enumerate(order):
             best, made = self.best, plans[i]
             if self._is_hopeless(promised) and not unpromising:
+                self.tally.dearer += len(order) - number
                 break
             known = self._tried if best is None else [*self._tried, best.plan]
-            if not any(alike(made, other) for other in known):
+            if any(alike(made, other) for other in known):
+                self.tally.alike += 1
+            else:
                 self._tried.append(made)
+                self.tally.refined += 1
                 found = _refine_path(self._task, self.finder, paths[i], made)
                 self.best = _better(best, found)
 
@@ -94,17 +152,24 @@ class Starts:
         one has, courses are brought near them at once. Returns the cost that is reached, infinite
         where the motion breaks limits or is not clear.
         """
+        self.tally.refined += 1
         made, ease = self._task.plan_at(*course, _CLAIM), self._far_outside
-        found = _refined(made, ease=ease)
+        found = self._refined(made, ease=ease)
         if not (found.done and (ease or found.cost_after <= (1 + FAR) * score)):
             self._far_outside |= found.done
-            other = _refined(made, ease=not ease)
+            other = self._refined(made, ease=not ease)
             found = min((found, other), key=lambda each: (not each.done, each.cost_after))
         if not (found.done and self.finder.is_clear(found.plan) and self._has_room(found.plan)):
             return np.inf
         self.found.append(found)
         self.best = _better(self.best, found)
         return found.cost_after
+
+    def _refined(self, made: Plan, *, ease: bool) -> Refinement:
+        """Return the refinement of a motion, which is first brought near the limits if `ease`."""
+        if ease:
+            made = refiner.reduce_excess(made, goals=self._goals)
+        return refiner.refine(made, first=FIRST_STEP, goals=self._goals)
 
     def _has_room(self, made: Plan) -> bool:
         """Return whether the tool can back off at each end where it can in the best motion."""
@@ -125,6 +190,7 @@ class Starts:
         if self.best is None:
             return
         found: Refinement | None
+        self.tally.refined += 1
         try:
             path = self.finder.find(find_shortest, task.problem)
         except NoFeasiblePath:
@@ -135,11 +201,6 @@ class Starts:
         if found is not None and found.done and self.finder.is_clear(found.plan):
             own = replace(found.plan, settings=self._task.settings)
             self.best = _better(self.best, replace(found, plan=own))
-
-
-def _refined(made: Plan, *, ease: bool) -> Refinement:
-    """Return the refinement of a motion, which is first brought near the limits if `ease`."""
-    return refiner.refine(refiner.reduce_excess(made) if ease else made, first=FIRST_STEP)
 
 
 def _refine_path(

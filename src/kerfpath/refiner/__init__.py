@@ -1,5 +1,7 @@
 """Refinement off the grid: gamma and external axes are continuous, postures and turns fixed."""
 
+from kerfpath.refiner.goals import Goal as Goal
+from kerfpath.refiner.goals import GoalKind as GoalKind
 from kerfpath.refiner.joint_curves import JointCurves as JointCurves
 from kerfpath.refiner.rates import KeptShares as KeptShares
 from kerfpath.refiner.refinement import MOST_INTERVALS as MOST_INTERVALS

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.refiner.goals import Goal
 from kerfpath.refiner.rates import LinearAcceleration, LinearTorque, RateLimits
 from kerfpath.refiner.rows import ConstraintRows, Rows
 from kerfpath.search import Metric
@@ -26,6 +27,8 @@ Target = Literal["sum", "max", "excess", "lost"]
 PRICE = 100.0
 """Price of exceeding a limit by once the limit; distances are rarely above 1 per interval."""
 
+LEAST_SHARP = 1e-6
+"""Least share of an acceleration limit at which its square root is linearised."""
 MARGIN = 1e-8
 """Share of a limit, or rad, that is left free for rounding."""
 
@@ -52,6 +55,10 @@ class LinearModel:
     metric : str
     cap : float
         Largest distance that is allowed; infinite: any.
+    gamma : (K,) rad
+        Without a change.
+    goals : tuple of Goal
+        Criteria in place of the distances; none: the distances count.
     acceleration : LinearAcceleration
         Largest accelerations where intervals meet.
     torque : LinearTorque or None
@@ -72,6 +79,8 @@ class LinearModel:
     weight: Array
     metric: Metric
     cap: float
+    gamma: Array
+    goals: tuple[Goal, ...]
     acceleration: LinearAcceleration
     torque: LinearTorque | None = None
 
@@ -87,6 +96,7 @@ class LinearModel:
         return replace(
             self,
             q=self.q - self.moved(delta),
+            gamma=self.gamma - delta[:, 0],
             acceleration=self.acceleration.through(delta),
             torque=None if torque is None else torque._replace(share=torque.at(-delta[:, 0])),
         )
@@ -97,15 +107,18 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     free = model.radius.shape
     rows = ConstraintRows(size := model.radius.size)
     dq, D = np.diff(model.q, axis=0), _increments(model)
-    beyond = _limits(rows, dq, D, model, rates, target)
+    beyond, shares = _limits(rows, dq, D, model, rates, target)
     _ranges(rows, model)
     unknown = np.arange(size)[:, None]
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
         rows.hold(Rows(np.full((size, 1), sign), unknown), bound.ravel())
-    if target == "excess":
+    if model.goals:
+        cost = _goals(rows, dq, D, model, target, shares, beyond)
+    elif target == "excess":
         cost = np.zeros(rows.variables)
     else:
         cost = _cost(rows, dq, D, model, minimax=target == "max")
+    cost = np.pad(cost, (0, rows.variables - len(cost)))
     cost[beyond] += 1.0 if target == "excess" else PRICE
     equal = None
     if rates.periodic:
@@ -139,11 +152,12 @@ def _unknowns(node: Ints, F: int) -> Ints:
 
 def _limits(
     rows: ConstraintRows, dq: Array, D: Rows, model: LinearModel, rates: RateLimits, target: Target
-) -> Ints:
+) -> tuple[Ints, list[tuple[Array, Rows]]]:
     """Add the limits (5), (6), on torques and jerks; return the unknowns of the excess over them.
 
     The excess is one unknown for all (target "excess"), or one for each interval and each node that
-    may exceed a limit ("lost"), not negative; else there is none.
+    may exceed a limit ("lost"), not negative; else there is none. Also return the shares of the
+    limits of velocity, up and down, and those of acceleration, with their slopes.
     """
     edges, n = dq.shape
     meetings, (v, a) = rates.meetings, rates.of(dq)
@@ -176,10 +190,11 @@ def _limits(
     ]
     if gained is not None:
         used[2:4] = [(share, slope.plus(-gained), of) for share, slope, of in used[2:4]]
+    shares = [(share, slope) for share, slope, _ in used[:4]]
     if target in ("sum", "max"):
         for share, slope, _ in used:
             rows.at_most(share, slope, 1 - MARGIN)
-        return rows.new(0)
+        return rows.new(0), shares
     # Shares that stay below 1, or below what another one needs at least, do not count.
     least = 1.0
     if target == "excess":
@@ -197,7 +212,7 @@ def _limits(
         rows.hold(Rows(-np.ones((len(beyond), 1)), beyond[:, None]), np.zeros(len(beyond)))
     for (share, slope, of), kept in zip(used, some, strict=True):
         rows.hold(slope.of(kept).beside(-1.0, unknown[of[kept]][:, None]), 1 - share[kept])
-    return beyond
+    return beyond, shares
 
 
 def _accelerations(model: LinearModel, limit: LinearAcceleration) -> Rows | None:
@@ -230,6 +245,90 @@ def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
         both = Rows(row @ one.value.reshape(K, n, F), _unknowns(np.arange(K), F))
         rows.at_most(model.q @ row, both, upper)
         rows.at_most(-(model.q @ row), -both, -lower)
+
+
+def _goals(
+    rows: ConstraintRows,
+    dq: Array,
+    D: Rows,
+    model: LinearModel,
+    target: Target,
+    shares: list[tuple[Array, Rows]],
+    beyond: Ints,
+) -> Array:
+    """Add the goals; return the coefficients of the sum of their prices times themselves.
+
+    Their largest values are limits, too, but for the target "lost".
+    """
+    made = [_goal(rows, dq, D, model, goal, shares) for goal in model.goals]
+    cost = np.zeros(rows.variables)
+    for goal, (row, constant) in zip(model.goals, made, strict=True):
+        if target == "excess":
+            most = np.full((1, 1), -goal.most)
+            rows.hold(row.beside(most, beyond[None]), np.array([goal.most - constant]))
+        else:
+            np.add.at(cost, row.column[0], goal.price * row.value[0])
+            if target != "lost":
+                rows.hold(row, np.array([goal.most * (1 - MARGIN) - constant]))
+    return cost
+
+
+def _goal(
+    rows: ConstraintRows,
+    dq: Array,
+    D: Rows,
+    model: LinearModel,
+    goal: Goal,
+    shares: list[tuple[Array, Rows]],
+) -> tuple[Rows, float]:
+    """Return an upper bound on a goal as one row and a constant."""
+    K, n, _ = model.slope.shape
+    if goal.kind == "way":
+        lengths, constant = _lengths(
+            rows, dq, D, replace(model, weight=goal.weight, metric="manhattan")
+        )
+        places, values = lengths.column.ravel(), lengths.value.ravel()
+        sums = np.bincount(places, values, rows.variables).astype(np.float64, copy=False)
+        column = np.flatnonzero(sums)
+        return Rows(sums[None, column], column[None]), float(constant.sum())
+    if goal.kind in ("span", "turn"):
+        turn = goal.kind == "turn"
+        one = Rows(model.radius[:, :1], _unknowns(np.arange(K), model.radius.shape[1])[:, :1])
+        each = [(model.gamma, one, 1.0)] if turn else []
+        slopes = _slopes(model)
+        for i in np.flatnonzero(goal.weight) if not turn else ():
+            each.append((model.q[:, i], slopes.of(slice(i, None, n)), goal.weight[i]))
+        ends, price = rows.new(2 * len(each)), np.repeat([w for _, _, w in each], 2)
+        price[1::2] *= -1.0
+        middle = [float(value.mean()) for value, _, _ in each]
+        pairs = ends.reshape(-1, 2)
+        for (value, slope, _), at, (top, low) in zip(each, middle, pairs, strict=True):
+            rows.hold(slope.beside(-1.0, np.full((K, 1), top)), at - value)
+            rows.hold((-slope).beside(1.0, np.full((K, 1), low)), value - at)
+        return Rows(price[None], ends[None]), 0.0
+    if goal.kind == "step":
+        weight = np.tile(goal.weight, len(dq))
+        value, slope = (goal.weight * dq).ravel(), D.scaled(weight)
+        some = weight != 0
+        sides = [(value[some], slope.of(some)), (-value[some], -slope.of(some))]
+    elif goal.kind == "interval":
+        # The square root of the accelerations, from above.
+        now = max(float(share.max(initial=LEAST_SHARP)) for share, _ in shares[2:])
+        half = now**-0.5 / 2
+        sides = [*shares[:2]]
+        for share, slope in shares[2:]:
+            by = np.full(len(share), half)
+            sides.append((share * half + now * half, slope.scaled(by)))
+    else:
+        sides = shares[:2] if goal.kind == "velocity" else shares[2:]
+    largest = rows.new(1)
+    # What stays below the least that another one needs cannot be the largest.
+    least = max(float((value - slope.span).max(initial=-np.inf)) for value, slope in sides)
+    for value, slope in sides:
+        some = value + slope.span >= least
+        column = np.tile(largest, (int(some.sum()), 1))
+        rows.hold(slope.of(some).beside(-1.0, column), -value[some])
+    return Rows(np.ones((1, 1)), largest[None]), 0.0
 
 
 def _cost(rows: ConstraintRows, dq: Array, D: Rows, model: LinearModel, minimax: bool) -> Array:

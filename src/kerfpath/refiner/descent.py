@@ -13,6 +13,7 @@ from kerfpath.kernels.turns import JointLimits
 from kerfpath.plans import path_cost
 from kerfpath.progress import may_stop
 from kerfpath.refiner.convex_program import MARGIN, PRICE, LinearModel, Target, solve
+from kerfpath.refiner.goals import Goal
 from kerfpath.refiner.joint_curves import JointCurves
 from kerfpath.refiner.rates import RateLimits
 from kerfpath.search import Metric, ObjectiveKind
@@ -116,6 +117,8 @@ class Descent:
         Cost of each node, taken as fixed; the cost after gamma has moved is computed at the end.
     cap : float
         Largest distance that is allowed in a step.
+    goals : tuple of Goal
+        Criteria in place of the objective; none: the objective.
     most : int
         Programs after which a descent ends.
     """
@@ -133,6 +136,7 @@ class Descent:
     first: float | None = None
     node_cost: Array | None = None
     cap: float = np.inf
+    goals: tuple[Goal, ...] = ()
     most: int = MOST_PROGRAMS
 
     __repr__ = short_repr
@@ -148,17 +152,25 @@ class Descent:
         if self.cap < np.inf:
             longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             excess = max(excess, longest / self.cap - 1)
+        gamma = free[:, 0]
+        for goal in self.goals:
+            excess = max(excess, goal.value(gamma, q, self.rates) / goal.most - 1)
         return MotionState(
             free=free,
             q=q,
-            cost=self.cost(q),
+            cost=self.cost(gamma, q),
             excess=excess,
             lost=self.rates.lost(q),
             outside=self._outside(q),
         )
 
-    def cost(self, q: Array) -> float:
-        """Return the objective (14) or (15) of joints (K, n) rad, not wrapped."""
+    def cost(self, gamma: Array, q: Array) -> float:
+        """Return the objective of a motion: (14) or (15), or the sum of the priced goals.
+
+        Gamma (K,) rad and joints (K, n) rad are not wrapped.
+        """
+        if self.goals:
+            return sum(goal.price * goal.value(gamma, q, self.rates) for goal in self.goals)
         dq = np.diff(q, axis=0)
         return path_cost(dq, self.weight, self.metric, self.objective, self.node_cost)
 
@@ -203,7 +215,7 @@ class Descent:
         With the objective "max", of motions with the same maximum it takes the least sum.
         """
         found, programs = self._run(at, self.objective)
-        if self.objective == "max":
+        if self.objective == "max" and not self.goals:
             tie = replace(self, objective="sum", cap=found.cost)
             smooth, more = tie._run(tie.stand(found.free, found.q), "sum")
             found, programs = self.stand(smooth.free, smooth.q), programs + more
@@ -265,9 +277,11 @@ class Descent:
 
     def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
         q = model.q + model.moved(delta)
+        gamma = model.gamma + delta[:, 0]
         if target == "excess":
-            return self.rates.excess(q)
-        return self.cost(q) + (PRICE * self.rates.lost(q) if target == "lost" else 0.0)
+            over = [goal.value(gamma, q, self.rates) / goal.most - 1 for goal in self.goals]
+            return max(self.rates.excess(q), *over) if over else self.rates.excess(q)
+        return self.cost(gamma, q) + (PRICE * self.rates.lost(q) if target == "lost" else 0.0)
 
     def _model(self, at: MotionState, radius: float) -> LinearModel:
         slope = self.curves.slope(at.free, at.q)
@@ -293,6 +307,8 @@ class Descent:
             weight=self.weight,
             metric=self.metric,
             cap=self.cap,
+            gamma=np.unwrap(at.free[:, 0]),
+            goals=self.goals,
             acceleration=self.rates.linear_acceleration(at.q, slope),
             torque=self.rates.linear_torque(at.q, slope[..., 0]),
         )

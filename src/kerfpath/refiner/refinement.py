@@ -15,6 +15,7 @@ from kerfpath.kernels.metric import wrap
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
 from kerfpath.refiner.descent import MOST_PROGRAMS, Descent, MotionState
+from kerfpath.refiner.goals import Goal
 from kerfpath.refiner.joint_curves import JointCurves, room_at_ends
 from kerfpath.refiner.rates import KeptShares, RateLimits
 from kerfpath.refiner.sections import has_sections, lowest_in_sections
@@ -87,6 +88,7 @@ def refine(
     within: tuple[Array, Array] | None = None,
     least: float = 0.0,
     most: int | None = None,
+    goals: tuple[Goal, ...] = (),
 ) -> Refinement:
     """Move gamma of a plan off its grid, to a lower cost or within limits that the grid breaks.
 
@@ -118,6 +120,9 @@ def refine(
         refined further.
     most : int, optional
         Convex programs after which a descent ends early; default: when it has converged.
+    goals : tuple of Goal
+        Criteria that take the place of the objective, each with a largest value; default: the
+        objective. The costs of the result are then sums of their prices times themselves.
 
     Returns
     -------
@@ -146,7 +151,7 @@ def refine(
     comfort = plan.settings.comfort
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "the cost of clearance is known on the grid only")
-    descent, start = _descent(asked, kept, within=within, most=most)
+    descent, start = _descent(asked, kept, within=within, most=most, goals=goals)
     descent = replace(descent, first=first)
     found, programs = _lowest(descent, start, least)
     if found.admitted and not _room_kept(asked, found):
@@ -172,7 +177,7 @@ def refine(
         plan=replace(refined, proof=proof),
         done=True,
         cost_before=start.cost,
-        cost_after=refined.cost,
+        cost_after=found.cost if goals else refined.cost,
         programs=programs,
         statement=proof.statement,
     )
@@ -220,14 +225,18 @@ def promise(plan: Plan) -> float:
 
 
 def reduce_excess(
-    plan: Plan, *, within: tuple[Array, Array] | None = None, most: int | None = None
+    plan: Plan,
+    *,
+    within: tuple[Array, Array] | None = None,
+    most: int | None = None,
+    goals: tuple[Goal, ...] = (),
 ) -> Plan:
     """Return the plan with gamma moved so that it exceeds the limits little, at little cost.
 
     The excess of every interval and every node over the limits has a price on top of the cost.
-    `within` and `most` are as in `refine`.
+    `within`, `most` and `goals` are as in `refine`.
     """
-    descent, start = _descent(plan, within=within, most=most)
+    descent, start = _descent(plan, within=within, most=most, goals=goals)
     return _plan_with_motion(plan, descent.with_reduced_excess(start))
 
 
@@ -288,6 +297,7 @@ def _descent(
     *,
     within: tuple[Array, Array] | None = None,
     most: int | None = None,
+    goals: tuple[Goal, ...] = (),
 ) -> tuple[Descent, MotionState]:
     """Return the descent of a plan, and the motion it starts from; `within` as in `refine`."""
     settings, comfort = plan.settings, plan.settings.comfort
@@ -325,6 +335,7 @@ def _descent(
         low=least,
         high=largest,
         most=MOST_PROGRAMS if most is None else most,
+        goals=goals,
     )
     return descent, descent.stand(np.column_stack([gamma, x]), q)
 

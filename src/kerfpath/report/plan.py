@@ -168,8 +168,14 @@ def _objective(plan: Plan) -> str:
     claim = plan.proof.statement
     return (
         f"Objective: {s.objective} of {s.metric} distances, method “{s.method}”, "
-        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}."
+        f"cost {plan.cost:.5g}. {claim[:1].upper()}{claim[1:]}.{_explored(plan)}"
     )
+
+
+def _explored(plan: Plan) -> str:
+    """Return a sentence on what the search followed and dropped; "" if there was none."""
+    told = plan.proof.explored
+    return "" if told is None else f" Search: {told.words}."
 
 
 def _postures(plan: Plan) -> str:
