@@ -13,7 +13,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import fastest_speed, layered_graph, node_interval
 
-__all__ = ["GAMMA_STEP", "ROBOTS", "Cut", "contour", "cut", "head", "posed"]
+__all__ = ["COARSE", "GAMMA_STEP", "ROBOTS", "Cut", "arm", "contour", "cut", "head", "posed"]
 
 ROBOTS = {
     "abb_irb2400_155": "cybertech_8_to_20kg",
