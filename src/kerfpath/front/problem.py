@@ -459,8 +459,9 @@ DIGITS = 12
 ROOM = 1e-8
 """rad, and share of a limit: by how much windows and shares are wider than in the motion that they
 hold. A refinement leaves as much free, so that it begins within them and ends as good."""
-SMALLEST, TINY = 0.01, 1e-9
-"""Share of the scale of a criterion that a value counts as at least when it is traded, and of 1."""
+SMALLEST, ZERO, TINY = 0.01, 5e-7, 1e-9
+"""Shares of the scale of a criterion: a value counts as at least the first when it is traded, and
+one below that may be worse by the second; and the least value that is held, in any unit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -678,9 +679,13 @@ class ParetoProblem:
             if goal is None:
                 run = criterion.hold(run, value, solution.spans, self)
                 continue
-            least = goal.most * SMALLEST * size / max(abs(value), TINY)
+            unit = criterion.goal(1.0, self)
+            assert unit is not None, "it has a goal for any value"
+            least = unit.most * SMALLEST * size
+            # A value that is nothing up to rounding is held to what fronts do not tell apart.
+            room = ZERO * unit.most * size if abs(value) < SMALLEST * size else 0.0
             price = goal.price / max(goal.most, least, TINY)
-            goals.append(replace(goal, price=price, most=goal.most * (1 + ROOM) + TINY))
+            goals.append(replace(goal, price=price, most=goal.most * (1 + ROOM) + room + TINY))
         if not goals:
             return replace(self.as_good(solution), continuous=True, begin=begin)
         return replace(run, goals=tuple(goals))

@@ -405,7 +405,8 @@ class FrontSearch:
         """
         problem, rng = self._problem, np.random.default_rng(self._seed)
         yield problem.unbounded
-        if not (has_grid := bool(self._found)):
+        has_grid = bool(self._found) or not problem.continuous or self._audited
+        if not has_grid:
             yield _explored(problem.unbounded)
             if not self._found:
                 return
@@ -430,6 +431,11 @@ class FrontSearch:
                 yield replace(run, continuous=True)
             while self._late and (again := self._refined_again()) is not None:
                 yield again
+
+    @property
+    def _audited(self) -> bool:
+        """Whether a run had a plan that failed its audit: others need not."""
+        return any(why.startswith("audit") for why in self._failures)
 
     def _held(self) -> Subproblem | None:
         """Return a run that tries to beat a plan of the grid on the front, once for each plan."""
@@ -502,7 +508,7 @@ class FrontSearch:
         proposed = self._proposed()
         flying: deque[tuple[int, Subproblem, Callable[[], Evaluation | str]]] = deque()
         while True:
-            most = self._ahead if self._found else 1
+            most = self._ahead if self._found or self._done > 1 else 1
             while len(flying) < most and (run := self._next(proposed)) is not None:
                 flying.append((self._begun, run, submit(self._begun, run)))
                 self._begun += 1
