@@ -18,6 +18,7 @@ from scipy.optimize import linprog
 
 from kerfpath import ParetoSet, Plan, PlanOptions, audit
 from kerfpath.arrays import Array
+from kerfpath.planner import longest_step
 from kerfpath.plans import on_turns
 
 __all__ = ["Attack", "attacks"]
@@ -93,7 +94,7 @@ class Problem:
         self.lower = np.where(free, -np.inf, limits.lower)
         self.upper = np.where(free, np.inf, limits.upper)
         self.frames, self.inverse = plan.frames, np.linalg.inv(plan.T_flange_tip)
-        self.steps = np.linalg.norm(np.diff(plan.contour.points, axis=0), axis=1)
+        self.step = longest_step(plan.contour)
 
     def motion(self, gamma: Array, near: Array, posture: Array) -> _Motion | None:
         c, s = np.cos(gamma), np.sin(gamma)
@@ -121,7 +122,7 @@ class Problem:
             return float(sharp.max())
         if kind == "speed":
             least = max(fast.max() / self.eta_v, np.sqrt(sharp.max() / self.eta_a))
-            return float(least * self.dt / self.steps.max())
+            return float(least * self.dt / self.step)
         assert kind == "rotation", f"expected one of {KINDS}, got {name!r}"
         return float(np.ptp(at.gamma))
 
@@ -161,7 +162,7 @@ class Problem:
         if kind == "speed":  # sqrt(x) by its tangent, from above
             now = max(float(np.abs(S.d2 / per).max()), 1e-12)
             root = np.sqrt(now / self.eta_a)
-            per_speed = self.dt / self.steps.max()
+            per_speed = self.dt / self.step
             scaled = [(p, per_speed / self.eta_v, 0.0) for p in fast]
             slope, offset = per_speed / (2 * root * self.eta_a), per_speed * root / 2
             scaled += [(p, slope, offset) for p in sharp]
