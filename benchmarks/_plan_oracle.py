@@ -20,6 +20,7 @@ a micrometre and a microradian are a hundredth of the repeatability of a robot."
 HARMLESS = {
     r"kerfpath$": "which version wrote the file",
     r"contours/\d+/(proof|optimal|grid_cost)$": "a claim about other motions: not repeated as fact",
+    r"contours/\d+/explored(/|$)": "what the search followed: not repeated as fact",
     r"contours/\d+/counts(/|$)": "how many poses were dropped for what reason: a record",
     r"contours/\d+/audit/checks/\d+/(title|advice|node)$": "words, and a place, of an old audit",
     r"sequence/(optimal|at_least_s)$": "a claim about other orders: not repeated as fact",
