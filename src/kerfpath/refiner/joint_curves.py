@@ -90,23 +90,19 @@ def room_at_ends(plan: Plan) -> tuple[Array, Array]:
 
     They are infinite between the ends, without a retract, and at an end that has no room as it is.
     """
-    K, n = plan.q.shape
+    K, m = len(plan.q), len(AWAY)
     low, high = np.full(K, -np.inf), np.full(K, np.inf)
     if plan.settings.retract is None:
         return low, high
-    frames, q = plan.frames, plan.unwrapped
-    for end in (0, K - 1):
-        for bound, sign in ((low, -1.0), (high, 1.0)):
-            posture = np.full(len(AWAY), plan.posture[end])
-            H = np.broadcast_to(frames[end], (len(AWAY), 4, 4))
-            curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
-            near = np.broadcast_to(q[end], (len(AWAY), n))
-            gamma = plan.gamma[end] + sign * AWAY
-            there = curves.at(np.column_stack([gamma, near[:, plan.robot.free]]), near)
-            reached = np.asarray(np.isfinite(there).all(axis=1))
-            there = np.where(reached[:, None], there, near)
-            tool = plan.T_flange_tip
-            room = has_room(plan.settings, plan.robot, there, posture, tool) & reached
-            if room[0] and not room.all():
-                bound[end] = plan.gamma[end] + sign * AWAY[np.argmin(room) - 1]
+    end, way = np.repeat([0, K - 1], 2 * m), np.tile(np.append(-AWAY, AWAY), 2)
+    near, posture, gamma = plan.unwrapped[end], plan.posture[end], plan.gamma[end] + way
+    curves = JointCurves(plan.robot, plan.frames[end], plan.T_flange_tip, posture)
+    there = curves.at(np.column_stack([gamma, near[:, plan.robot.free]]), near)
+    reached = np.asarray(np.isfinite(there).all(axis=1))
+    there = np.where(reached[:, None], there, near)
+    room = has_room(plan.settings, plan.robot, there, posture, plan.T_flange_tip) & reached
+    for k, both, far in zip((0, K - 1), room.reshape(2, 2, m), gamma.reshape(2, 2, m), strict=True):
+        for bound, free, angle in zip((low, high), both, far, strict=True):
+            if free[0] and not free.all():
+                bound[k] = angle[np.argmin(free) - 1]
     return low, high
