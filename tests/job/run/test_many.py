@@ -44,6 +44,7 @@ def nest(tmp_path, monkeypatch):
     return tmp_path / "nest.toml"
 
 
+@pytest.mark.slow
 def test_very_many_contours_are_cut_in_the_posture_in_which_some_cost_least(nest, monkeypatch):
     crews, said = [], []
 
