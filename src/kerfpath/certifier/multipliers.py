@@ -18,6 +18,9 @@ from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
 FAST = 10.0
 """Price of an increment beyond (5), in largest prices of (6)."""
+LEAST_WORTH = 0.25
+"""Share of the largest weight that the prices of every joint are measured by at least: a joint
+without weight costs nothing, but its limits keep others from moving less."""
 NOTHING = 1e-4
 """Share of a weight below which a price counts as zero."""
 _Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
@@ -43,10 +46,12 @@ def limit_prices(
         Largest change of gamma at each layer.
     most : float
         The largest price per interval, in weights, which is the penalty for breaking (6) in the
-        program. Large prices give better bounds close to the motion, and worse ones farther away.
+        program; see `LEAST_WORTH`. Large prices give better bounds close to the motion, and worse
+        ones farther away.
     """
     edges, n = u.shape
     weight, own = np.tile(steps.weight, edges), u.ravel()
+    worth = np.maximum(weight, LEAST_WORTH * steps.weight.max())
     moved = _moved(slope * reach, n)
     each, apart = np.repeat(spans / 1.0, n), np.repeat((spans[:-1] + spans[1:]) / 2, n)
     mean = sparse.diags_array(1 / each) @ moved
@@ -74,8 +79,8 @@ def limit_prices(
         [
             cost @ moved,
             np.ones(len(turns)),
-            FAST * most * weight[fast],
-            most * (apart * weight[: len(bend)])[acts],
+            FAST * most * worth[fast],
+            most * (apart * worth[: len(bend)])[acts],
             np.ones(edges if lengths else 0),
         ]
     )
@@ -89,7 +94,7 @@ def limit_prices(
         return None
     prices = np.zeros(len(bend))
     prices[acts] = dual
-    prices[np.abs(prices) <= NOTHING * weight[: len(bend)]] = 0.0
+    prices[np.abs(prices) <= NOTHING * worth[: len(bend)]] = 0.0
     return np.pad(prices.reshape(edges - 1, n), ((1, 1), (0, 0)))
 
 
