@@ -144,8 +144,7 @@ class EmptyTubes:
             if left is None:
                 return None
             waiting += left
-        ((node, _),) = self._blamed.most_common(1)
-        return node
+        return max(self._blamed, key=lambda node: self._blamed[node], default=int(nodes[1]))
 
     def _left_of(self, part: _Part) -> list[_Part] | None:
         """Return parts of what is left of a tube; None if it cannot be divided further."""
