@@ -735,13 +735,21 @@ class ParetoProblem:
             if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"
-        moved = self.options.interpolation
-        wrong = (
-            full_audit(made, cell=self.setup.cell, interpolation=moved)
-            if self.audit is None
-            else self.audit(made)
-        )
+        wrong = self._faults(made)
         return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
+
+    def _faults(self, made: Plan) -> Sequence[object]:
+        """Return the faults of a plan: by the tip's straight moves, or by even moves of the joints.
+
+        The second only if the controller may move so, as where a motion passes a singularity.
+        """
+        if self.audit is not None:
+            return self.audit(made)
+        wrong = full_audit(made, cell=self.setup.cell)
+        if wrong and self.options.interpolation == "joint":
+            evenly = full_audit(made, cell=self.setup.cell, interpolation="joint")
+            return evenly and wrong
+        return wrong
 
     def evaluate(self, made: Plan) -> Evaluation:
         """Return the losses and joint spans of a plan.
