@@ -20,12 +20,17 @@ from kerfpath.job.format.cell import cell_of_job
 MOST = 300
 
 
+def needs_its_extra(package):
+    """What cannot be imported here; it has no data objects."""
+    assert package == "kerfpath.compas"
+
+
 def public_classes():
     found = {}
-    for module in pkgutil.walk_packages(kerfpath.__path__, "kerfpath."):
+    for module in pkgutil.walk_packages(kerfpath.__path__, "kerfpath.", needs_its_extra):
         inner = module.name.split(".")[1:]
         # Public is what packages list; the kernels' tuples of arrays are nobody's to print.
-        if not (module.ispkg or len(inner) == 1) or inner[0] in ("cli", "kernels"):
+        if not (module.ispkg or len(inner) == 1) or inner[0] in ("cli", "compas", "kernels"):
             continue
         for value in vars(importlib.import_module(module.name)).values():
             if (

@@ -62,7 +62,8 @@ class Crew:
         """Return `function(item)` for all items, in their order.
 
         What the processes leave because they have died is done here. Whatever the function or
-        `begin` raises first is raised.
+        `begin` raises first is raised; processes that are still at an item are ended then, as
+        nobody wants its result.
 
         Parameters
         ----------
@@ -103,10 +104,11 @@ class Crew:
         for thread in threads:
             thread.start()
         work(here)
-        if not failed:
-            for thread in threads:
-                thread.join()
-            work(here)
+        for other, thread in zip(self._others, threads, strict=True):
+            if failed and thread.is_alive():
+                other.kill()
+            thread.join()
+        work(here)
         if failed:
             raise failed[0]
         return [done[k] for k in range(len(items))]
@@ -140,9 +142,13 @@ class _Other:
 
         return call
 
-    def end(self) -> None:
+    def kill(self) -> None:
+        """Kill the process; later calls raise."""
         self._process.kill()
         self._process.wait()
+
+    def end(self) -> None:
+        self.kill()
         self._ours.close()
 
 
@@ -164,6 +170,6 @@ def _answer(request: bytes) -> bytes:
         effort, function, item = pickle.loads(request)
         set_effort(effort)
         found = True, function(item)
-    except Exception as error:  # raised again by the parent
+    except (Exception, SystemExit) as error:  # sent back to the caller, not hidden
         found = False, error
     return pickle.dumps(found)

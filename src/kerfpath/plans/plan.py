@@ -172,6 +172,8 @@ class Explored:
     alike: int
     left: int
 
+    __repr__ = short_repr
+
     @property
     def words(self) -> str:
         """The numbers in a sentence."""
