@@ -181,7 +181,7 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
     if name == "pareto":
         from benchmarks import pareto
 
-        return [pareto.run(quick=quick)]
+        return pareto.run(quick=quick)
     if name == "layout":
         from benchmarks import layout
 

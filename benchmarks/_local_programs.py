@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from kerfpath import ParetoSet, Plan, PlanOptions, audit
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, Ints
 from kerfpath.planner import longest_step
 from kerfpath.plans import on_turns
 
@@ -72,7 +72,7 @@ class _Part(NamedTuple):
 class _Motion:
     gamma: Array
     q: Array
-    posture: Array
+    posture: Ints
 
 
 @dataclass(kw_only=True, eq=False)
@@ -96,7 +96,7 @@ class Problem:
         self.frames, self.inverse = plan.frames, np.linalg.inv(plan.T_flange_tip)
         self.step = longest_step(plan.contour)
 
-    def motion(self, gamma: Array, near: Array, posture: Array) -> _Motion | None:
+    def motion(self, gamma: Array, near: Array, posture: Ints) -> _Motion | None:
         c, s = np.cos(gamma), np.sin(gamma)
         T = np.tile(np.eye(4), (len(gamma), 1, 1))
         T[:, 0, 0], T[:, 0, 1], T[:, 1, 0], T[:, 1, 1] = c, -s, s, c
@@ -246,7 +246,7 @@ class _Program:
             )
             parts.append(wide + extra)
             bounds.append(-value)
-        found = linprog(
+        found = linprog(  # type: ignore[call-overload]  # sparse matrices are not in its stubs
             self.cost, A_ub=sparse.vstack(parts).tocsc(), b_ub=np.concatenate(bounds),
             bounds=np.column_stack([self.low, self.high]), method="highs",
         )  # fmt: skip
@@ -359,7 +359,7 @@ def _restored(problem: Problem, at: _Motion, most: Array) -> _Motion:
 
 
 def attacks(
-    front: ParetoSet, options: PlanOptions, *, seed: int = 0, told: Callable[[str], None] = print
+    front: ParetoSet, options: PlanOptions, *, seed: int = 0, say: Callable[[str], None] = print
 ) -> list[Attack]:
     """Return the best attack on every plan of a front."""
     rng, found = np.random.default_rng(seed), []
@@ -378,14 +378,14 @@ def attacks(
         apart = np.abs(front.scaled - front.scaled[i]).max(axis=1)
         near = [j for j in np.argsort(apart, kind="stable") if j != i][:NEIGHBOURS]
         begin = [("neighbour", own[j]) for j in near]
-        for size in CHANGES:
-            wave = _wave(rng, len(own[i].gamma)) * size
+        for change in CHANGES:
+            wave = _wave(rng, len(own[i].gamma)) * change
             moved = problem.motion(own[i].gamma + wave, own[i].q, own[i].posture)
             if moved is not None:
                 begin.append(("change", moved))
         size = np.maximum(least, SMALL * np.abs(front.reference - front.ideal))
         scale, least = 1 / size, np.maximum(least, SMALL * size)
-        tries = []
+        tries = list[tuple[str, _Motion, Array]]()
         for c in range(len(least)):
             weights = scale * np.where(np.arange(len(least)) == c, 1.0, OTHERS)
             tries.append(("itself", own[i], weights))
@@ -403,7 +403,7 @@ def attacks(
             if gains[c] > best.gain:
                 best = Attack(float(gains[c]), front.criteria[c], name, _valid(plan, ended))
         found.append(best)
-        told(f"{i} {least.round(4)} run {front.numbers[i]} {best} programs {problem.programs}")
+        say(f"{i} {least.round(4)} run {front.numbers[i]} {best} programs {problem.programs}")
     return found
 
 

@@ -113,7 +113,7 @@ def _attacked(*, quick: bool) -> Report:
         begun = process_time()
         front = pareto(criteria=criteria, runs=6 if quick else 30, gamma_step=STEP, **task)
         made = process_time()
-        found = attacks(front, PlanOptions(), told=lambda _: None)
+        found = attacks(front, PlanOptions(), say=lambda _: None)
         gains = np.array([attack.gain for attack in found if attack.valid])
         worst = max(worst, float(gains.max(initial=0.0)))
         rows.append(
@@ -136,7 +136,11 @@ def _drawn(name: str, number: int, share: float) -> dict[str, Any]:
     """Return the task of a random contour that a robot can cut."""
     machine = random_contours.arm(name)
     assert machine.reach is not None
-    task = {"robot": machine, "tool": random_contours.head(), "placement": np.eye(4)}
+    task: dict[str, Any] = {
+        "robot": machine,
+        "tool": random_contours.head(),
+        "placement": np.eye(4),
+    }
     while True:
         rng = np.random.default_rng([77, number, *name.encode()])
         contour = random_contours.contour(rng, machine.reach).resample(count=NODES)
