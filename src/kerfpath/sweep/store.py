@@ -299,7 +299,7 @@ class Sweep:
         )
 
     def _report(self) -> None:
-        total = len(self._tasks) if self._total is None else self._total
+        total = max(len(self._tasks), self._total or 0)
         self._progress("tasks", len(self._tasks) - len(self._coming), total)
 
     def __enter__(self) -> Sweep:
