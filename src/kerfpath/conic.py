@@ -13,7 +13,11 @@ from scipy import sparse
 from kerfpath.arrays import Array
 from kerfpath.memory import require_memory
 
-__all__ = ["ConicSolution", "NonnegativeConeT", "SecondOrderConeT", "ZeroConeT", "minimise"]
+__all__ = [
+    "ConicSolution", "NonnegativeConeT", "SecondOrderConeT", "SparseRows", "ZeroConeT", "minimise",
+]  # fmt: skip
+
+SparseRows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 ROOM = 64 * 1024**2
@@ -31,7 +35,7 @@ class ConicSolution(NamedTuple):
 
 
 def minimise(
-    cost: Array, rows: Any, bounds: Array, cones: Sequence[Any], *, threads: int = 0
+    cost: Array, rows: SparseRows, bounds: Array, cones: Sequence[Any], *, threads: int = 0
 ) -> ConicSolution:
     """Minimise cost x, so that bounds - rows x lies in the cones.
 

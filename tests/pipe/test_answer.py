@@ -154,4 +154,8 @@ def test_requests_are_answered_over_a_pipe():
     )  # fmt: skip
     answers = [json.loads(line) for line in done.stdout.splitlines()]
     assert [found.get("error") for found in answers] == [None, "input", "input", "input", None]
+    for found, said in zip(
+        answers[1:4], ("Expecting value", "an object, got '[]'", "expected 'p"), strict=True
+    ):
+        assert said in found["message"]
     assert answers[0]["q"] == answers[-1]["q"] == answer(asked(circle(20)))["q"]

@@ -30,8 +30,18 @@ from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.elimination import Elimination
 from kerfpath.certifier.neighbours import within
 from kerfpath.certifier.stages import Steps, distinct_groups, linked
-from kerfpath.certifier.tube import Duals, Tube, TubeRows, enclosed, hull
-from kerfpath.certifier.tubes import DEEPEST
+from kerfpath.certifier.tube import (
+    DEEPEST,
+    Duals,
+    Tube,
+    TubeRows,
+    enclosed,
+    finer,
+    hull,
+    limit_share,
+    motion_through,
+    tube_about,
+)
 from kerfpath.conic import NonnegativeConeT, minimise
 
 ACROSS = 24
@@ -119,8 +129,8 @@ class EmptyTubes:
     ----------
     count : int
         Number of tubes so far.
-    motion : Array, optional
-        Gamma (K,) of a motion along the whole contour, in one posture, that keeps the limits at the
+    motion : tuple, optional
+        Gamma (K,) and the posture of a motion along the whole contour that keeps the limits at the
         nodes, if one was come upon; then nothing is proved.
     """
 
@@ -220,15 +230,8 @@ class EmptyTubes:
 
     def _excess(self, gamma: Array, nodes: Ints, posture: int) -> float:
         """Return by which share of the limits a motion with gamma (M,) exceeds them at most."""
-        q, _, reached = self._maker.joints(nodes, gamma, posture)
-        if not reached.all():
-            return np.inf
-        spans, steps = np.diff(nodes)[:, None], self._steps
-        u = np.diff(q, axis=0)
-        u = (u - np.where(self._maker.turns, TURN * np.rint(u / TURN), 0.0)) / spans
-        bent = np.diff(u, axis=0) / ((spans[:-1] + spans[1:]) / 2)
-        fast = np.abs(u / steps.velocity).max()
-        return float(max(fast, np.abs(bent / steps.acceleration).max(initial=0.0))) - 1
+        motion = motion_through(self._maker, nodes, gamma, posture)
+        return np.inf if motion is None else limit_share(motion[1], np.diff(nodes), self._steps) - 1
 
     def _passes(self, gamma: Array, nodes: Ints, posture: int) -> bool:
         """Return whether a motion near gamma (M,) passes all nodes; the whole one is kept."""
@@ -240,19 +243,11 @@ class EmptyTubes:
         for _ in range(POLISHED):
             if over <= 0:
                 break
-            curves = self._maker.curves(nodes, gamma, half, same)
+            tube = tube_about(self._maker, nodes, gamma, half, same)
             half = half / CLOSER
-            if curves is None:
+            if tube is None:
                 continue
-            center, slope, bend, spread = curves
-            short = TURN * np.rint(np.diff(center, axis=0) / TURN)
-            center[1:] -= np.cumsum(np.where(self._maker.turns, short, 0.0), axis=0)
-            found = program.solve(
-                Tube(
-                    middle=gamma, half=half * CLOSER, center=center, slope=slope, bend=bend,
-                    twist=np.zeros_like(bend), spread=spread,
-                )
-            )  # fmt: skip
+            found = program.solve(tube)
             if found is None:
                 break
             better = self._excess(found[1], nodes, posture)
@@ -267,7 +262,7 @@ class EmptyTubes:
         """Return the groups of cells that elimination leaves, or all if there are too many."""
         cells, nodes = part.cells, part.nodes
         for _ in range(ROUNDS):
-            cells = self._finer(cells, int(nodes[-1]))
+            cells = finer(self._maker, cells, int(nodes[-1]), ACROSS)
             present = np.isin(nodes, cells.node)
             if not present.all():
                 self._blamed[int(nodes[max(int(np.argmin(present)), 1)])] += 1
@@ -292,15 +287,6 @@ class EmptyTubes:
         found_cells = [one.cells.take(each) for each in groups]
         whole = [each for each in found_cells if np.isin(nodes, each.node).all()]
         return [replace(part, cells=each, twins=twins) for each in whole]
-
-    def _finer(self, cells: CellSet, last: int) -> CellSet:
-        """Return the cells, halved where a node has few."""
-        while True:
-            few = np.bincount(cells.node, minlength=last + 1) < ACROSS
-            which = few[cells.node] & (cells.level < DEEPEST)
-            if not which.any():
-                return cells
-            cells = self._maker.divided(cells, which)
 
     def _halves(
         self, cells: CellSet, nodes: Ints, pull: Array | None, motion: Array | None
@@ -353,18 +339,8 @@ def binding_window(
         The motion.
     """
     nodes, half = np.arange(len(gamma)), np.full(len(gamma), TRUST / CLOSER**2)
-    curves = maker.curves(nodes, gamma, half, posture)
-    if curves is None:
-        return None
-    center, slope, bend, spread = curves
-    short = TURN * np.rint(np.diff(center, axis=0) / TURN)
-    center[1:] -= np.cumsum(np.where(maker.turns, short, 0.0), axis=0)
-    found = _Excess(steps, nodes).solve(
-        Tube(
-            middle=gamma, half=half, center=center, slope=slope, bend=bend,
-            twist=np.zeros_like(bend), spread=spread,
-        )
-    )  # fmt: skip
+    tube = tube_about(maker, nodes, gamma, half, posture)
+    found = None if tube is None else _Excess(steps, nodes).solve(tube)
     if found is None:
         return None
     duals, _ = found

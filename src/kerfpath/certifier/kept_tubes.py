@@ -18,8 +18,8 @@ from kerfpath.certificate import Branch, cell_bounds
 from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.parts import CARE
 from kerfpath.certifier.stages import StageResult, Steps, solve_stage
-from kerfpath.certifier.tube import Tube, hull
-from kerfpath.certifier.tubes import AGAIN, ROUNDS, Found, Part, Split, Tubes
+from kerfpath.certifier.tube import Tube, finer, hull
+from kerfpath.certifier.tubes import ACROSS, AGAIN, ROUNDS, Found, Part, Split, Tubes
 
 FINE, MOST_CELLS = 6, 1200
 """Level up to which cells of tubes that are too wide for a program are halved, and the most cells
@@ -87,7 +87,7 @@ class KeptTubes(Tubes):
         rounds = 0
         while True:
             rounds += 1
-            cells = self._finer(cells)
+            cells = finer(self._maker, cells, int(self._nodes[-1]), ACROSS)
             low, high = hull(cells, self._nodes)
             tube = self._tube(cells, low, high)
             found = None if tube is None else self._solved(tube)

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from kerfpath.arrays import Array, Ints
 from kerfpath.certifier.stages import Steps
-from kerfpath.conic import NonnegativeConeT, SecondOrderConeT, minimise
+from kerfpath.conic import NonnegativeConeT, SecondOrderConeT, SparseRows, minimise
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
 FAST = 10.0
@@ -23,7 +23,6 @@ LEAST_WORTH = 0.25
 without weight costs nothing, but its limits keep others from moving less."""
 NOTHING = 1e-4
 """Share of a weight below which a price counts as zero."""
-_Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 
 def limit_prices(
@@ -84,7 +83,7 @@ def limit_prices(
             np.ones(edges if lengths else 0),
         ]
     )
-    groups: list[tuple[_Rows, Array, Array | float]] = [
+    groups: list[tuple[SparseRows, Array, Array | float]] = [
         (sparse.diags_array(weight[turns]) @ moved[turns], weight[turns] * own[turns], 0.0),
         (moved[fast], own[fast], velocity[fast]),
         (bent[acts], bend[acts], bound[acts]),
@@ -98,7 +97,7 @@ def limit_prices(
     return np.pad(prices.reshape(edges - 1, n), ((1, 1), (0, 0)))
 
 
-def _moved(slope: Array, n: int) -> _Rows:
+def _moved(slope: Array, n: int) -> SparseRows:
     """Return the derivatives of the increments by the nodes' gamma, ((K-1) n, K)."""
     nodes = len(slope)
     row = np.arange((nodes - 1) * n)
@@ -110,12 +109,12 @@ def _moved(slope: Array, n: int) -> _Rows:
 class Lengths(NamedTuple):
     """Weighted increments slope x + value, ((K-1) n,), and the metric that makes lengths of n."""
 
-    slope: _Rows
+    slope: SparseRows
     value: Array
     n: int
     metric: int
 
-    def cones(self, first: int, unknowns: int) -> tuple[_Rows, Array, list[Any]]:
+    def cones(self, first: int, unknowns: int) -> tuple[SparseRows, Array, list[Any]]:
         """Return rows, right sides and cones by which unknowns from `first` on are no shorter."""
         edges = len(self.value) // self.n
         each = np.arange(len(self.value)) // self.n
@@ -139,7 +138,7 @@ class Lengths(NamedTuple):
 
 
 def _dual(
-    groups: list[tuple[_Rows, Array, Array | float]], cost: Array, lengths: Lengths | None
+    groups: list[tuple[SparseRows, Array, Array | float]], cost: Array, lengths: Lengths | None
 ) -> Any:
     """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group, or None.
 
@@ -151,7 +150,7 @@ def _dual(
     first = boxed + np.cumsum([0, *sizes])
     unknowns = len(cost)
 
-    def own(begin: int, size: int) -> _Rows:
+    def own(begin: int, size: int) -> SparseRows:
         place = np.arange(size), np.arange(begin, begin + size)
         return sparse.csr_array((np.ones(size), place), shape=(size, unknowns))
 

@@ -17,13 +17,14 @@ and products of bounded factors lie between planes (McCormick, Mathematical Prog
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from kerfpath.arrays import Array, Ints
 from kerfpath.certifier.stages import Steps
+from kerfpath.conic import SparseRows
 
 ROUNDS = 3
 """How often the changes of gamma and the changes of these narrow each other."""
@@ -31,7 +32,6 @@ ROUNDED, WIDER = 1e-12, 1e-9
 """Relative error allowed for rounding: of quotients, and of sums along the tube in half-widths."""
 TOUCHES = 0.0, 0.5, 1.0
 """Where in its interval the square of a change of gamma is held from below."""
-_Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 
 class Changes(NamedTuple):
@@ -88,8 +88,7 @@ def steps_of_gamma(
     slope = _slopes(own, h[1:-1])
     curved = 2 * own[:, 2]
     lowest, highest = curved - 6 * np.abs(own[:, 3]) * wide, curved + 6 * np.abs(own[:, 3]) * wide
-    bend_least, bend_most = np.full((2, len(own)), -np.inf)
-    bend_most = -bend_most
+    bend_least, bend_most = np.full(len(own), -np.inf), np.full(len(own), np.inf)
     for _ in range(ROUNDS):
         far = np.maximum(np.abs(least), np.abs(most))
         near = np.maximum(np.maximum(least, -most), 0.0)
@@ -173,20 +172,20 @@ def within(changes: Changes, half: Array) -> tuple[Array, Array]:
     return low - rounded, high + rounded
 
 
-def ties(changes: Changes, half: Array, spans: Ints) -> tuple[_Rows, Array]:
+def ties(changes: Changes, half: Array, spans: Ints) -> tuple[SparseRows, Array]:
     """Return rows (R, 2 M) and their largest values (R,), of gamma and its squares.
 
     Both are in units of half-widths, as in the programs of tubes.
     """
     M, dia = len(half), sparse.diags_array
     unit = sparse.eye_array(2 * M, format="csr")
-    t: _Rows = dia(half) @ unit[:M]
-    w: _Rows = dia(half**2) @ unit[M:]
+    t: SparseRows = dia(half) @ unit[:M]
+    w: SparseRows = dia(half**2) @ unit[M:]
     least, most, bend_least, bend_most = changes
     before, after = 1 / spans[:-1], 1 / spans[1:]
     d, both, square = t[1:] - t[:-1], t[1:] + t[:-1], w[1:] - w[:-1]
     reach = half[1:] + half[:-1]
-    rows: list[tuple[_Rows, Array]] = [
+    rows: list[tuple[SparseRows, Array]] = [
         (d, most),
         (-d, -least),
         (dia(least) @ both - dia(reach) @ d - square, -least * reach),
@@ -215,10 +214,8 @@ def ties(changes: Changes, half: Array, spans: Ints) -> tuple[_Rows, Array]:
                 (touch + 2 * (dia(bend_least) @ own - dia(h) @ e), level - 2 * bend_least * h),
                 (touch + 2 * (dia(bend_most) @ own + dia(h) @ e), level + 2 * bend_most * h),
             ]
-    row, bound = (
-        sparse.csr_array(sparse.vstack([a for a, _ in rows])),
-        np.concatenate([b for _, b in rows]),
-    )
+    row = sparse.csr_array(sparse.vstack([a for a, _ in rows]))
+    bound = np.concatenate([b for _, b in rows])
     size = abs(row).max(axis=1).toarray().ravel()
     size[size == 0] = 1.0
     return dia(1 / size) @ row, bound / size

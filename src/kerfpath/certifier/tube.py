@@ -15,6 +15,7 @@ from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.neighbours import Changes, steps_of_gamma, ties
 from kerfpath.certifier.stages import Steps
+from kerfpath.conic import SparseRows
 from kerfpath.kernels.reduced import excess
 
 NARROW = 0.2
@@ -28,7 +29,8 @@ UNIT = 2.0**-52
 ROUNDED = 1e-13
 """Rounding error of the curves, in rad per rad and in rad."""
 FACTORIAL = np.array([1.0, 1.0, 2.0, 6.0])
-_Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
+DEEPEST = 18
+"""Largest level of the cells: 2e-5 deg."""
 
 
 class Duals(NamedTuple):
@@ -64,7 +66,7 @@ class Tube:
     twist: Array
     spread: Array
     changes: Changes | None = None
-    tied: tuple[_Rows, Array] | None = None
+    tied: tuple[SparseRows, Array] | None = None
 
     __repr__ = short_repr
 
@@ -206,6 +208,62 @@ class TubeRows:
         above = rest[: 2 * (size - n)].reshape(2, M - 2, n)
         nu = np.pad(above[0] - above[1], ((1, 1), (0, 0)))
         return Duals(y, nu, found[2 * size : 2 * size + count])
+
+
+def tube_about(
+    maker: CellMaker, nodes: Ints, gamma: Array, half: Array, posture: Ints
+) -> Tube | None:
+    """Return the tube within half-widths (M,) rad of a motion; None where a pose is singular.
+
+    Endless joints are on the turns that follow each other.
+
+    Parameters
+    ----------
+    maker : CellMaker
+    nodes, gamma, half, posture : (M,)
+    """
+    curves = maker.curves(nodes, gamma, half, posture)
+    if curves is None:
+        return None
+    center, slope, bend, spread = curves
+    short = TURN * np.rint(np.diff(center, axis=0) / TURN)
+    center[1:] -= np.cumsum(np.where(maker.turns, short, 0.0), axis=0)
+    return Tube(
+        middle=gamma, half=half, center=center, slope=slope, bend=bend, twist=np.zeros_like(bend),
+        spread=spread,
+    )  # fmt: skip
+
+
+def motion_through(
+    maker: CellMaker, nodes: Ints, gamma: Array, posture: int
+) -> tuple[Array, Array] | None:
+    """Return joints (M, n) and increments (M - 1, n) of a motion; None if a node is out of reach.
+
+    Endless joints take the short way.
+    """
+    q, _, reached = maker.joints(nodes, gamma, posture)
+    if not reached.all():
+        return None
+    u = np.diff(q, axis=0)
+    return q, u - np.where(maker.turns, TURN * np.rint(u / TURN), 0.0)
+
+
+def limit_share(u: Array, spans: Ints, steps: Steps) -> float:
+    """Return the largest share of (5) and (6) that increments u (M - 1, n) take."""
+    rate, apart = u / spans[:, None], ((spans[:-1] + spans[1:]) / 2)[:, None]
+    bent = np.diff(rate, axis=0) / apart
+    fast = np.abs(rate / steps.velocity).max()
+    return float(max(fast, np.abs(bent / steps.acceleration).max(initial=0.0)))
+
+
+def finer(maker: CellMaker, cells: CellSet, last: int, across: int) -> CellSet:
+    """Return cells of nodes up to `last`, halved wherever a node has fewer than `across`."""
+    while True:
+        few = np.bincount(cells.node, minlength=last + 1) < across
+        which = few[cells.node] & (cells.level < DEEPEST)
+        if not which.any():
+            return cells
+        cells = maker.divided(cells, which)
 
 
 def enclosed(

@@ -33,15 +33,23 @@ from kerfpath.certifier.cells import TURN, CellMaker, CellSet
 from kerfpath.certifier.multipliers import Lengths
 from kerfpath.certifier.parts import CARE, SAME_COST
 from kerfpath.certifier.stages import StageResult, Steps, solve_stage
-from kerfpath.certifier.tube import Duals, Tube, TubeRows, enclosed, hull
+from kerfpath.certifier.tube import (
+    DEEPEST,
+    Duals,
+    Tube,
+    TubeRows,
+    enclosed,
+    finer,
+    hull,
+    limit_share,
+    motion_through,
+)
 from kerfpath.conic import NonnegativeConeT, minimise
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.search import Course
 
 ACROSS = 16
 """Cells of a node below which all of them are halved."""
-DEEPEST = 18
-"""Largest level: cells of 2e-5 deg."""
 WIDEST = 0.5
 """rad: largest half-width of an interval for which a program is solved."""
 TRUST, WIDER, TIMES = 0.017, 2.0, 5
@@ -201,7 +209,7 @@ class Tubes:
     def _divide(self, part: Part, known: float) -> None:
         """Bound a tube, and queue what is left of it, in parts, if it may cost less."""
         self.count += 1
-        cells = self._finer(part.cells)
+        cells = finer(self._maker, part.cells, int(self._nodes[-1]), ACROSS)
         if len(np.unique(cells.node)) < len(self._nodes):
             return
         low, high = hull(cells, self._nodes)
@@ -252,17 +260,12 @@ class Tubes:
     def _look_at(self, gamma: Array, cells: CellSet) -> None:
         """Take the plan of a motion with gamma (M,) in the posture of cells if it costs less."""
         posture = int(cells.posture[0])
-        q, _, reached = self._maker.joints(self._nodes, gamma, posture)
-        if not reached.all():
+        motion = motion_through(self._maker, self._nodes, gamma, posture)
+        if motion is None:
             return
-        u = np.diff(q, axis=0)
-        u -= np.where(self._maker.turns, TURN * np.rint(u / TURN), 0.0)
-        spans, steps = self._program.spans[:, None], self._steps
-        bent = np.diff(u / spans, axis=0) / ((spans[:-1] + spans[1:]) / 2)
-        fast = np.abs(u / spans / steps.velocity).max()
-        sharp = np.abs(bent / steps.acceleration).max(initial=0.0)
-        cost = float(steps.distance(u).sum())
-        if cost >= self._tried or max(fast, sharp) > NEARLY:
+        q, u = motion
+        cost = float(self._steps.distance(u).sum())
+        if cost >= self._tried or limit_share(u, self._program.spans, self._steps) > NEARLY:
             return
         course = np.concatenate([q[:1], q[0] + np.cumsum(u, axis=0)])
         reached_cost = self._cheaper(Course(gamma, course, np.full(len(q), posture)))
@@ -277,15 +280,6 @@ class Tubes:
             return False
         self._closed = min(self._closed, known)
         return True
-
-    def _finer(self, cells: CellSet) -> CellSet:
-        """Return the cells, halved where a node has few."""
-        while True:
-            few = np.bincount(cells.node, minlength=int(self._nodes[-1]) + 1) < ACROSS
-            which = few[cells.node] & (cells.level < DEEPEST)
-            if not which.any():
-                return cells
-            cells = self._maker.divided(cells, which)
 
     def _tube(self, cells: CellSet, low: Array, high: Array) -> Tube | None:
         """Return the curves on the hull of cells, or on a part of it.

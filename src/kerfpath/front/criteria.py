@@ -63,7 +63,7 @@ class PerJoint(Criterion):
         velocity, _ = problem.robot.speed_limits()
         one = np.arange(len(velocity)) == self.joint
         weight = 1 / velocity if self.joint is None else one.astype(np.float64)
-        return Goal(kind=self.kind, weight=freeze(weight), price=1.0, most=value)
+        return Goal(kind=self.kind, most=value, weight=freeze(weight))
 
 
 class Displacement(PerJoint):
@@ -168,7 +168,7 @@ class Peak(Criterion):
 
     def goal(self, value: float, problem: ParetoProblem) -> Goal:
         most = value / self.usable(problem)
-        return Goal(kind=self.kind, weight=freeze(np.zeros(0)), price=1.0, most=most)
+        return Goal(kind=self.kind, most=most)
 
 
 class Velocity(Peak):
@@ -232,7 +232,7 @@ class Speed(Criterion):
 
     def goal(self, value: float, problem: ParetoProblem) -> Goal:
         most = longest_step(problem.contour) / problem.dt / value
-        return Goal(kind="interval", weight=freeze(np.zeros(0)), price=1.0, most=most)
+        return Goal(kind="interval", most=most)
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
         quicker = problem.dt / problem.least.slower.dt * (1 - ROUNDING)
@@ -306,7 +306,7 @@ class Rotation(Criterion):
         return float(np.ptp(np.unwrap(plan.gamma)))
 
     def goal(self, value: float, problem: ParetoProblem) -> Goal:
-        return Goal(kind="turn", weight=freeze(np.zeros(0)), price=1.0, most=value)
+        return Goal(kind="turn", most=value)
 
 
 class Reversals(Criterion):

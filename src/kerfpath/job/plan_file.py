@@ -575,10 +575,8 @@ def certificate_entry(certificate: Certificate) -> CertificateData:
         entry["branches"] = [
             {
                 "stages": [_stage_entry(stage) for stage in branch.stages],
-                "y": None if branch.y is None else _packed(branch.y, kind),
-                "multipliers": (
-                    None if branch.multipliers is None else _packed(branch.multipliers, kind)
-                ),
+                "y": _packed(branch.y, kind),
+                "multipliers": _packed(branch.multipliers, kind),
                 "node": branch.node,
                 "posture": branch.posture,
                 "gamma": branch.gamma,
@@ -589,10 +587,7 @@ def certificate_entry(certificate: Certificate) -> CertificateData:
 
 
 def _stage_entry(stage: Stage) -> StageData:
-    entry = {
-        name: None if (part := getattr(stage, name)) is None else _packed(part, kind)
-        for name, kind in TYPES.items()
-    }
+    entry = {name: _packed(getattr(stage, name), kind) for name, kind in TYPES.items()}
     return cast(StageData, entry)
 
 
@@ -617,7 +612,7 @@ def read_certificate(data: CertificateData) -> Certificate:
 def _branch(where: str, data: BranchData) -> Branch:
     kind = TYPES["multipliers"]
     y, nu = (
-        None if packed is None else _unpacked(packed, kind, f"{where}: {name}")
+        _unpacked(packed, kind, f"{where}: {name}")
         for name, packed in (("y", data["y"]), ("multipliers", data["multipliers"]))
     )
     return Branch(
@@ -638,7 +633,7 @@ def _stage(where: str, data: StageData) -> Stage:
     arrays: dict[str, NDArray[np.generic] | None] = {}
     for name, kind in TYPES.items():
         packed = cast(ArrayData | None, data[name])  # type: ignore[literal-required]  # one of TYPES
-        arrays[name] = None if packed is None else _unpacked(packed, kind, f"{where}: {name}")
+        arrays[name] = _unpacked(packed, kind, f"{where}: {name}")
     C = arrays["node"].shape[:1] if arrays["node"] is not None else ()
     for name, part in arrays.items():
         if part is not None and name != "multipliers" and part.shape[:1] != C:
@@ -646,7 +641,9 @@ def _stage(where: str, data: StageData) -> Stage:
     return Stage(**arrays)  # type: ignore[arg-type]  # each of its type
 
 
-def _packed(part: NDArray[np.generic], kind: str) -> ArrayData:
+def _packed(part: NDArray[np.generic] | None, kind: str) -> ArrayData | None:
+    if part is None:
+        return None
     raw = np.ascontiguousarray(part, dtype=kind).tobytes()
     return {
         "type": kind,
@@ -655,7 +652,9 @@ def _packed(part: NDArray[np.generic], kind: str) -> ArrayData:
     }
 
 
-def _unpacked(data: ArrayData, kind: str, where: str) -> NDArray[np.generic]:
+def _unpacked(data: ArrayData | None, kind: str, where: str) -> NDArray[np.generic] | None:
+    if data is None:
+        return None
     if data["type"] != kind:
         raise InputError(f"{where}: expected numbers of type {kind}, got {data['type']!r}")
     shape = data["shape"]

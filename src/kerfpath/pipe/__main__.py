@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from typing import Any
 
 from kerfpath.pipe.answer import answer
 
@@ -12,15 +13,21 @@ def main() -> None:
     """Answer until the input ends. What else is printed goes to standard error."""
     answers, sys.stdout = sys.stdout, sys.stderr
     for line in sys.stdin:
-        try:
-            request = json.loads(line)
-            if not isinstance(request, dict):
-                raise ValueError("expected an object")
-            found = answer(request)
-        except (ValueError, KeyError) as error:
-            found = {"error": "input", "message": f"request: {error!r}"}
-        answers.write(json.dumps(found) + "\n")
+        answers.write(json.dumps(_answered(line)) + "\n")
         answers.flush()
+
+
+def _answered(line: str) -> dict[str, Any]:
+    """Return the answer to a line, whatever it says."""
+    try:
+        request = json.loads(line)
+        if not isinstance(request, dict):
+            raise TypeError(f"expected an object, got {line.strip()[:40]!r}")
+        return answer(request)
+    except KeyError as error:
+        return {"error": "input", "message": f"request: expected {error.args[0]!r}, got none"}
+    except (TypeError, ValueError) as error:  # JSON that does not end, too
+        return {"error": "input", "message": f"request: {error}"}
 
 
 if __name__ == "__main__":

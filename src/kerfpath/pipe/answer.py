@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath.arrays import Array, Ints, as_pose, floats, integers, positive, scalar
 from kerfpath.cell import Body, Cell, Hull, Mesh, Shape, allowed_pairs, cell_of, link_bodies
-from kerfpath.contour import Contour
+from kerfpath.contour import Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner import plan
 from kerfpath.plans import Plan, TransferMove, node_rates
@@ -145,19 +145,13 @@ def _parts(length: Array, most: float) -> Ints:
 
 def _turned_evenly(axes: Array, at: Array) -> Array:
     """Return axes at places between nodes, turned evenly from each to the next."""
-    length = np.linalg.norm(axes, axis=1, keepdims=True)
-    if (length < 1e-9).any():
-        raise InputError(f"axes of waypoints: axis {int(np.argmin(length))} has no length")
-    unit = axes / length
+    if (zero := np.flatnonzero(~axes.any(axis=1))).size:
+        raise InputError(f"axes of waypoints: axis {zero[0]} has no length")
+    axes = unit(axes)
+    if (back := np.flatnonzero(angle_between(axes[:-1], axes[1:]) > np.pi - 1e-6)).size:
+        raise InputError(f"axes of waypoints: {back[0]} and {back[0] + 1} point opposite ways")
     k = np.clip(at.astype(np.int64), 0, len(axes) - 2)
-    one, two, share = unit[k], unit[k + 1], (at - k)[:, None]
-    angle = np.arccos(np.clip((one * two).sum(axis=1, keepdims=True), -1, 1))
-    if (angle > np.pi - 1e-6).any():
-        raise InputError("axes of waypoints: two that follow each other point opposite ways")
-    sine = np.where(angle < 1e-9, 1.0, np.sin(angle))
-    before = np.where(angle < 1e-9, 1 - share, np.sin((1 - share) * angle) / sine)
-    after = np.where(angle < 1e-9, share, np.sin(share * angle) / sine)
-    return np.asarray(before * one + after * two)
+    return slerp(axes[k], axes[k + 1], (at - k)[:, None])
 
 
 # -----------------------------------------------------------------------------

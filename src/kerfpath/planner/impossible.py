@@ -7,6 +7,7 @@ from math import sqrt
 
 import numpy as np
 
+from kerfpath.arrays import Array, Ints
 from kerfpath.certifier import MotionTest
 from kerfpath.compiling import finish_compiling
 from kerfpath.effort import current_effort
@@ -66,19 +67,19 @@ def at_any_gamma(
         return broken
     limits = task.problem.limits
     nodes = binding_nodes(motions)[:MOST_PLACES] if motions else [broken.node + 1]
-    tubes = current_effort().infeasibility_tubes
-    each = (test.closed(limits, task.dt, around) for around in (*nodes, None))
-    closed = next((found for found in each if found is not None), None)
-    if closed is None:
-        binding = (motions[-1].plan.gamma, motions[-1].plan.posture) if motions else None
+    binding = (motions[-1].plan.gamma, motions[-1].plan.posture) if motions else None
+    tried: list[tuple[int | None, int, tuple[Array, Ints] | None]]
+    tried = [(around, 0, None) for around in (*nodes, None)]
+    if tubes := current_effort().infeasibility_tubes:
         few = max(tubes // FEW_TUBES, 1)
-        tried = [(nodes[0], binding, few), *((node, None, few) for node in nodes[:MOST_PARTS])]
-        tried.append((nodes[0], binding, tubes))
-        divided = (
-            test.closed(limits, task.dt, around, tubes=most, binding=about)
-            for around, about, most in tried
-        )
-        closed = next((found for found in divided if found is not None), None)
+        tried.append((nodes[0], few, binding))
+        tried += [(node, few, None) for node in nodes[:MOST_PARTS]]
+        tried.append((nodes[0], tubes, binding))
+    tests = (
+        test.closed(limits, task.dt, around, tubes=most, binding=about)
+        for around, most, about in tried
+    )
+    closed = next((found for found in tests if found is not None), None)
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
     if not broken.proved:

@@ -8,12 +8,12 @@ Optim. Theory Appl. 26, 1978), whichever prices there are, so long as none is ze
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from kerfpath.arrays import Array, short_repr
+from kerfpath.arrays import Array, freeze, short_repr
 from kerfpath.refiner.rates import RateLimits
 
 GoalKind = Literal["way", "step", "span", "turn", "velocity", "acceleration", "interval"]
@@ -29,18 +29,18 @@ class Goal:
     Parameters
     ----------
     kind : str
+    most : float
+        Largest value.
     weight : (n,)
         Weights of the joints, for the first three kinds.
     price : float
         Above 0.
-    most : float
-        Largest value.
     """
 
     kind: GoalKind
-    weight: Array
-    price: float
     most: float
+    weight: Array = field(default_factory=lambda: freeze(np.zeros(0)))
+    price: float = 1.0
 
     __repr__ = short_repr
 
