@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kerfpath.cad import Part, read
+from kerfpath.cad import Machine, Part, read
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
@@ -340,3 +340,62 @@ def test_a_program_without_z_is_flat(tmp_path: Path) -> None:
     file.write_text(f"{FLAT}G0 Z5\n")
     with pytest.raises(InputError, match="line 4: a move at feed, but Z was not given before"):
         read(file, axis=(0, 0, -1))
+
+
+LINE = "G0 X0 Y0 Z5\nG1 Z0 F{}\nX100 F{}\nY50\nG0 Z5\nM30\n"
+"""An approach along the tool axis, which is no cut, and a cut."""
+FEEDS = {
+    "mm": ("G21 G94\n" + LINE.format(200, 3000), {}, [3000]),
+    "inches": ("G20\n" + LINE.format(10, 120), {}, [120 * 25.4]),
+    "inches, with feeds": ("G700 G94\n" + LINE.format(10, 120), {}, [120 * 25.4]),
+    "the unit is given": (LINE.format(10, 3000), {"unit": "mm"}, [3000]),
+    "the approach has no feed": ("G21\n" + LINE.replace("F{}", "", 1).format(3000), {}, [3000]),
+    "a feed stays": (
+        "G21\nG0 X-50 Y0 Z0\nG1 X-9 F3000\n" + LINE.replace("F{}", ""), {}, [3000, 3000]
+    ),
+    "a dwell is no feed": ("G21\nG4 F1\n" + LINE.format(200, "3000\nG4 F2"), {}, [3000]),
+    "back to a speed": ("G21 G95\nG94\n" + LINE.format(200, 3000), {}, [3000]),
+    "several": ("G21\n" + LINE.format(200, "3000").replace("Y50", "Y50 F1500"), {}, [(3000, 1500)]),
+    "several, as before": (
+        "G21\n" + LINE.format(200, "3000").replace("Y50", "Y50 F1500\nX0 F3000"), {},
+        [(3000, 1500)],
+    ),
+    "none": ("G21\n" + LINE.replace("F{}", ""), {}, [()]),
+    "none at first": ("G21\n" + LINE.replace("F{}", "").replace("Y50", "Y50 F3000"), {}, [()]),
+    "inverse time": ("G21 G93\n" + LINE.format(30, 30), {}, [()]),
+    "per revolution": ("G21 G95\n" + LINE.format(0.1, 0.1), {}, [()]),
+    "the unit of the control": ("G70\n" + LINE.format(10, 120), {}, [()]),
+    "nothing": ("G21\n" + LINE.format(0, 0), {}, [()]),
+    "Heidenhain": (HEIDENHAIN, {}, [3000]),
+    "Heidenhain, in inches": (HEIDENHAIN.replace(" MM\n1", " INCH\n1"), {}, [()]),
+    "Heidenhain, of the tool": (
+        HEIDENHAIN.replace(" F3000", "").replace("S100", "S100 F2000"), {}, [2000]
+    ),
+    "Heidenhain, of plunging": (HEIDENHAIN.replace("M3\n", "M103 F20\n"), {}, [()]),
+    "Heidenhain, per revolution": (HEIDENHAIN.replace("M3\n", "M136\n"), {}, [()]),
+    "Heidenhain, of M128": (
+        HEIDENHAIN.replace("F3000\n8", "F3000\n8", 1).replace("M128", "M128 F500"), {}, [3000]
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FEEDS)
+def test_the_feeds_along_a_cut(tmp_path: Path, case: str) -> None:
+    text, options, feeds = FEEDS[case]
+    if case.startswith("Heidenhain"):
+        part = program(tmp_path, text, name="cut.h", **options)
+    else:
+        part = program(tmp_path, text, axis=(0, 0, -1), **options)
+    expected = [one if isinstance(one, tuple) else (one,) for one in feeds]
+    assert len(part.loops) == len(expected)
+    for loop, each in zip(part.loops, expected, strict=True):
+        assert loop.feeds == pytest.approx([feed / 60_000 for feed in each], rel=1e-9)
+    is_no_speed = case in ("inverse time", "per revolution", "the unit of the control")
+    assert any("F is no speed of the tip" in note for note in part.notes) == is_no_speed
+
+
+def test_a_feed_while_a_table_turns_is_no_speed_of_the_tip(tmp_path: Path) -> None:
+    text = "G21 G94\nG0 X0 Y0 Z0 A0\nG1 X20 F3000\nG0 X0 Y5\nG1 X20 A10 F3000\nM30\n"
+    machine = Machine(table="A", centre=(0, 0, -0.03))
+    part = program(tmp_path, text, machine=machine)
+    assert [loop.feeds for loop in part.loops] == [(0.05,), ()]

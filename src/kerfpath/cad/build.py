@@ -137,6 +137,7 @@ def loop_of(
     gap: float,
     layer: str = "",
     colour: str = "",
+    feeds: tuple[float, ...] = (),
 ) -> Loop:
     """Return the loop along `trace` with its measures; it is closed if no gap is above `gap` (m).
 
@@ -166,6 +167,7 @@ def loop_of(
         diameter=_diameter_of(trace) if is_round else None,
         layer=layer,
         colour=colour,
+        feeds=feeds,
         _trace=trace,
     )
 

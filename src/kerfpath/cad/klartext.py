@@ -33,6 +33,9 @@ ENDS = ("M2", "M02", "M30")
 IN_MACHINE = ("M91", "M92")
 CHANGING = ("M89", "M99", "M114", "M118", "M130", "M140", "M144")
 """Called cycles, compensated tool axes, handwheel, other systems: moves that are not supported."""
+CHANGING_FEED = ("M103", "M109", "M110", "M111", "M136")
+"""F is a share while plunging, of arcs, or per revolution: no speed of the tip from here on."""
+TOOL_FEED = re.compile(r"TOOL CALL\b.*\sF([0-9.,]+)(?:\s|$)")
 NO_TCPM = re.compile(r"FUNCTION RESET TCPM$|M129$")
 WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[0-9.,]+|MAX)|(R[0LR])$")
 RADIUS = re.compile(r"R([-+][0-9.,]+)")
@@ -76,6 +79,8 @@ class _Program:
         self.unused: set[str] = set()
         self._pole: dict[str, float] = {}
         self._arcs_refused = ""
+        self._feed: float | None = None
+        self._has_feeds = True
         self._end = 0
 
     def take(self, line: int, where: str, text: str) -> None:
@@ -115,7 +120,11 @@ class _Program:
             elif kind == "TOOL":
                 if other := TOOL_AXIS.match(text):
                     self._arcs_refused = f"about the tool axis {other[1]}"
+                if said := TOOL_FEED.match(text):
+                    self._take_feed(where, said[1])
                 self.tip.forget(line)
+            elif text in CHANGING_FEED:
+                self._has_feeds = False
             self.unused.add(kind)
         else:
             raise InputError(f"{where}: {text[:40]!r}: {_reason(kind)}")
@@ -174,9 +183,14 @@ class _Program:
             name, text = found[1], found[2]
             if name in ("A", "B", "C") and self.tip.machine is None:
                 raise InputError(f"{where}: {name}: a rotary axis; {GIVE_MACHINE}")
-            if name in ("M", "F"):
-                is_rapid |= (name, text) == ("F", "MAX")
-                extras.add(f"M{text}" if name == "M" else "F")
+            if name == "F":
+                if text == "MAX":
+                    is_rapid = True
+                elif not extras & {"M103", "M128"}:  # whose own number it is
+                    self._take_feed(where, text)
+            elif name == "M":
+                extras.add(f"M{text}")
+                self._has_feeds &= f"M{text}" not in CHANGING_FEED
             elif name is not None:
                 if name in values:
                     raise InputError(f"{where}: {name} twice in one block")
@@ -193,6 +207,11 @@ class _Program:
             self._keep_tip(line, keeps=False)
         if any(each in extras for each in ENDS):
             self._end = line
+
+    def _take_feed(self, where: str, text: str) -> None:
+        """Take a feed, in mm/min; a program in inches may mean tenths of them."""
+        feed = finite(text.replace(",", "."), f"{where}: F")
+        self._feed = feed if feed > 0 else None
 
     def _keep_tip(self, line: int, *, keeps: bool) -> None:
         """Switch the tool-centre-point control on or off."""
@@ -222,7 +241,11 @@ class _Program:
                 )
             self.tip.go_away(line, angles)
         elif place or axis or angles:
-            self.tip.go(line, feed=not is_rapid, place=place, axis=axis, arc=arc, angles=angles)
+            known = self._has_feeds and self.unit == "mm"
+            self.tip.go(
+                line, feed=not is_rapid, place=place, axis=axis, arc=arc, angles=angles,
+                rate=self._feed if known else None,
+            )  # fmt: skip
 
 
 def _reason(word: str) -> str:

@@ -70,8 +70,18 @@ REFUSED = {
 }  # fmt: skip
 ENDS = (2, 17, 30)
 TOOL_CHANGE = 6
+PER_MINUTE = 94
+OTHER_FEEDS: dict[float, str] = {
+    93: "an inverse time (G93)",
+    95: "a length per revolution (G95)",
+    96: "a length per revolution (G96)",
+    97: "a length per revolution (G97)",
+}
+"""What F is under other words than G94; it is no speed of the tip then."""
+INCH_PLACES, IN_BASIC_UNIT = 70, "mm or inches as the control is set (G70; G700 says inches)"
+"""A word by which positions are in inches, and the unit that F has then."""
 CALLS = (98, 99)
-UNUSED = "DFHMST"
+UNUSED = "DHMST"
 ROTARY = "ABC"
 ORIENTATION = re.compile("[ABC][0-9]+")
 BY_VECTOR = {"ORIVECT": True, "ORIPLANE": True, "ORIAXES": False}
@@ -110,7 +120,10 @@ def _siemens_path(lines: Sequence[str], machine: Machine | None) -> ToolPath:
             block.add(name, value, shorter)
         program.take(block)
     return ToolPath(
-        moves=program.tip.moves, unit=program.unit, notes=program.tip.notes, unused=program.unused
+        moves=program.tip.moves,
+        unit=program.unit,
+        notes=[*program.tip.notes, *program.notes],
+        unused=program.unused,
     )
 
 
@@ -186,6 +199,10 @@ class _Program:
         self._by_ijk = False
         self._offset = 0.0
         self._end = 0
+        self._feed: float | None = None
+        self._feed_kind = ""
+        self._is_basic = False
+        self.notes: list[str] = []
 
     def take(self, block: _Block) -> None:
         """Take one block.
@@ -212,6 +229,9 @@ class _Program:
             raise InputError(f"{where}: {next(iter(angles))}: a rotary axis; {GIVE_MACHINE}")
         if 4 in block.g or 64 in block.g:
             words.pop("P", None)  # a time, or a tolerance
+        if 4 in block.g:
+            words.pop("F", None)  # a time
+        self._take_feed(block)
         if unknown := [name for name in words if name.rstrip("0123456789") not in UNUSED]:
             raise InputError(f"{where}: {_word_refusal(unknown[0])}")
         self.unused |= {name.rstrip("0123456789") for name in words} | ({"M"} if block.m else set())
@@ -227,6 +247,22 @@ class _Program:
             self.tip.forget(line)
         if any(m in ENDS for m in block.m):
             self._end = line
+
+    def _take_feed(self, block: _Block) -> None:
+        """Take what F is, and F itself, in the unit of the file per minute."""
+        kind = self._feed_kind
+        for g in block.g:
+            kind = OTHER_FEEDS.get(g, kind)
+        if PER_MINUTE in block.g:
+            kind = ""
+        if kind != self._feed_kind:
+            self._feed_kind, self._feed = kind, None
+        if (feed := block.words.pop("F", None)) is None:
+            return
+        other = self._feed_kind or (IN_BASIC_UNIT if self._is_basic else "")
+        self._feed = feed if feed > 0 and not other else None
+        if other and not self.notes:
+            self.notes.append(f"{block.where}: F is no speed of the tip, but {other}")
 
     def _keywords(self, block: _Block) -> bool:
         """Take the keywords; return whether the positions are in machine coordinates."""
@@ -266,6 +302,7 @@ class _Program:
             if self.unit != UNITS[int(g)] and (self.unit or self.tip.has_places):
                 raise InputError(f"{where}: G{g:g} after moves in another unit, or without one")
             self.unit = UNITS[int(g)]
+            self._is_basic = g == INCH_PLACES
         elif g in OFFSETS:
             if g != self._offset and self.tip.has_places:
                 raise InputError(f"{where}: G{g:g} after moves; write all of them in one system")
@@ -329,8 +366,9 @@ class _Program:
             a, b, c = (value or 0.0 for value in vector)  # the controller takes missing ones as 0
             axis = unit_axis((a, b, c), block.where, any_length=True)
         self.tip.go(
-            block.line, feed=self._motion > 0, place=place, axis=axis, arc=arc, angles=angles
-        )
+            block.line, feed=self._motion > 0, place=place, axis=axis, arc=arc, angles=angles,
+            rate=self._feed,
+        )  # fmt: skip
 
 
 def _word_refusal(name: str) -> str:

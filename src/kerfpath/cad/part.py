@@ -156,6 +156,9 @@ class Loop:
     layer, colour : str
         Layer and colour (red, ..., white, #ff8000, aci30) in a DXF or of a STEP face; "" if the
         file has none, or if they differ within a skin.
+    feeds : tuple of float m/s
+        Speeds that the program it is read from says along it, each once in their order; empty if it
+        says none, or not those of the tip in the part.
     """
 
     name: str
@@ -174,6 +177,7 @@ class Loop:
     skin: str = ""
     layer: str = ""
     colour: str = ""
+    feeds: tuple[float, ...] = ()
     _trace: Trace = field(repr=False)
 
     __repr__ = short_repr

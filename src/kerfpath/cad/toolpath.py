@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple
@@ -126,6 +127,8 @@ class Move:
         The arc that a feed move runs along; it rises evenly if its ends differ in height.
     rotary : Rotary or None
         The rotary axes, instead of `axis`, in the program of a machine that has them.
+    rate : float or None
+        Speed of a feed move, in the unit of the file per minute; None if it is not known.
     """
 
     line: int | str
@@ -135,6 +138,7 @@ class Move:
     operation: str = ""
     arc: Arc | None = None
     rotary: Rotary | None = None
+    rate: float | None = None
 
     __repr__ = short_repr
 
@@ -179,12 +183,12 @@ class Tip:
     def go(
         self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None,
         arc: Callable[[Triple, Triple], Arc] | None = None,
-        angles: Mapping[str, float] = MappingProxyType({}),
+        angles: Mapping[str, float] = MappingProxyType({}), rate: float | None = None,
     ) -> None:  # fmt: skip
         """Move to `place`, of which any of the coordinates "X", "Y" and "Z" may be missing.
 
         `arc` returns the arc from the place before (3,) to this one (3,); `angles` (deg) has the
-        rotary axes that move, by their letters.
+        rotary axes that move, by their letters; `rate` is the speed of a feed move, see `Move`.
 
         Raises
         ------
@@ -216,8 +220,11 @@ class Tip:
                 raise InputError(f"line {line}: an arc from a place that is not known")
             along = arc((x, y, z), point)
         self.moves.append(
-            Move(line=line, kind=kind, point=point, axis=self._axis, arc=along, rotary=rotary)
-        )
+            Move(
+                line=line, kind=kind, point=point, axis=self._axis, arc=along, rotary=rotary,
+                rate=rate,
+            )
+        )  # fmt: skip
 
     def nearest(self, name: str, angle: float) -> float:
         """Return an angle (deg) plus the turns that bring it nearest to where a rotary axis is."""
@@ -399,7 +406,8 @@ def part_of_tool_path(
     holes = 0
     for run in _runs(tool_path.moves):
         name = f"cut{len(loops) + 1}"
-        points, normals, lines = _arrays(run, UNITS_MM[unit or tool_path.unit], axis, machine)
+        mm = UNITS_MM[unit or tool_path.unit]
+        points, normals, lines, rates = _arrays(run, mm, axis, machine)
         first, last = _trimmed(points, normals)
         if last - first < 1:
             holes += 1
@@ -415,7 +423,7 @@ def part_of_tool_path(
         loops.append(
             loop_of(
                 name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap,
-                layer=run[-1].operation,
+                layer=run[-1].operation, feeds=_feeds(rates[first + 1 : last + 1] * mm * MM / 60),
             )
         )  # fmt: skip
     none = Counter({("feed move", "along the tool axis only, as for a hole", True): holes})
@@ -452,8 +460,11 @@ def _runs(moves: Sequence[Move]) -> list[list[Move]]:
 
 def _arrays(
     run: Sequence[Move], mm: float, axis: Array | None, machine: Machine | None
-) -> tuple[Array, Array, Array]:
-    """Return points (K, 3) mm, unit normals (K, 3) and lines (K,) of a run."""
+) -> tuple[Array, Array, Array, Array]:
+    """Return points (K, 3) mm, unit normals (K, 3), lines (K,) and speeds to them (K,) of a run.
+
+    Speeds are in the unit of the file per minute, 0 where none is known.
+    """
     ends = np.array([move.point for move in run]) * mm
     if (far := np.flatnonzero((np.abs(ends) > LARGEST).any(axis=1))).size:
         raise InputError(
@@ -468,8 +479,31 @@ def _arrays(
     else:
         each = _with_rotary_axes(run, ends, ways, machine)
     points, normals = (np.concatenate(one) for one in zip(*each, strict=True))
-    lines = np.array([move.line for move in run])
-    return points, normals, np.repeat(lines, [len(one) for one, _ in each])
+    sizes = [len(one) for one, _ in each]
+    lines = np.repeat(np.array([move.line for move in run]), sizes)
+    rates = np.repeat(_rates(run), sizes)
+    return points, normals, lines, rates
+
+
+def _rates(run: Sequence[Move]) -> Array:
+    """Return the speed of the tip in each move of a run (K,), 0 where none is known.
+
+    Where rotary axes turn without control of the tip, the speed in the program is not that of the
+    tip in the part.
+    """
+    rates = np.array([move.rate or 0.0 for move in run])
+    for k, (before, move) in enumerate(pairwise(run), start=1):
+        if before.rotary is None or move.rotary is None or move.rotary.tcp:
+            continue
+        if before.rotary.angles != move.rotary.angles:
+            rates[k] = 0.0
+    return rates
+
+
+def _feeds(speeds: Array) -> tuple[float, ...]:
+    """Return the speeds (m/s) along a cut, each once in their order; none if one is not known."""
+    feeds = tuple(dict.fromkeys(float(f"{speed:.12g}") for speed in speeds))
+    return () if 0.0 in feeds else feeds
 
 
 Placed = tuple[Array, Array]

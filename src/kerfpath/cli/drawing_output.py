@@ -221,6 +221,7 @@ def _contours_entry(part: Part, html: Path | None) -> dict[str, object]:
                 "skin": loop.skin,
                 "layer": loop.layer,
                 "colour": loop.colour,
+                "feeds_m_s": loop.feeds,
                 "edge_turns": [
                     {"at_m": turn.at.tolist(), "angle_deg": float(np.degrees(turn.angle))}
                     for turn in loop.edge_turns

@@ -284,10 +284,13 @@ def _spacing(part: Part, along: Contour) -> float:
 def _contour(loop: Loop, spacing: float) -> str:
     speed = _speed(loop)
     slower = "" if speed == SPEED else "       # guess: slower, as the joints lag on a small circle"
-    return (
-        f"[[contour]]\npick = {toml_value(loop.name)}\nspeed_m_min = {speed:g}{slower}\n"
-        f"spacing_mm = {spacing:g}\n\n"
-    )
+    said = f"speed_m_min = {speed:g}{slower}"
+    if loop.feeds:
+        own = ", ".join(f"{feed * 60:.4g}" for feed in loop.feeds)
+        said = f"# speed_m_min: by default the feed of the program, {own} m/min"
+        if loop.feeds[1:]:
+            said = f"speed_m_min = {max(loop.feeds) * 60:.4g}   # the program has feeds of {own}"
+    return f"[[contour]]\npick = {toml_value(loop.name)}\n{said}\nspacing_mm = {spacing:g}\n\n"
 
 
 def _speed(loop: Loop) -> float:

@@ -323,6 +323,8 @@ def drafts_of(
     windows = {each.windows for each in job.contours if each.table.pick_all is not None}
     if spec is task and windows - {task.windows}:
         return None
+    if not spec.speed:  # that of its program, which is read with the new job
+        return None
     slower = task.speed / spec.speed
     made = warm_start(before, spec.asked(job.options), dt=cut.candidate.dt * slower)
     if made is None:

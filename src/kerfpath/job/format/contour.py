@@ -14,7 +14,8 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables import ContourTable
 from kerfpath.job.format.tables.part import SAMPLINGS, LeadTable
-from kerfpath.job.format.values import MOST_NODES
+from kerfpath.job.format.values import LARGEST, MOST_NODES, SMALLEST
+from kerfpath.names import listed
 from kerfpath.operations import (
     Side,
     Surface,
@@ -165,7 +166,8 @@ class ContourSpec:
     name : str
         Name of the contour in messages, reports and programs.
     speed : float m/s
-        Speed along the path.
+        Speed along the path; 0 until it is that of the program that the loop is read from, see
+        `expanded`.
     spacing : float m, optional
         Largest distance between nodes.
     time_step : float s, optional
@@ -208,6 +210,9 @@ class ContourSpec:
     def expanded(self, part: Part) -> list[ContourSpec]:
         """Return one spec for each loop of the part that this one picks.
 
+        Without a speed in the table it is the one that the program says along the loop; it stays 0
+        if that says none or several, see `lacks_speed`.
+
         Raises
         ------
         InputError
@@ -215,11 +220,33 @@ class ContourSpec:
         """
         if self.table.pick_all is None:
             loop = part.loop(self.pick)
-            return [replace(self._of_size(loop), pick=loop.name, name=self.name)]
+            return [replace(self._of_size(loop)._at_speed(loop), pick=loop.name, name=self.name)]
         return [
-            replace(self._of_size(loop), pick=loop.name, name=loop.name)
+            replace(self._of_size(loop)._at_speed(loop), pick=loop.name, name=loop.name)
             for loop in self.table.pick_all.loops(part)
         ]
+
+    def _at_speed(self, loop: Loop) -> ContourSpec:
+        """Return the spec at its own speed, or else at the only one of the loop's program."""
+        if self.speed > 0 or len(loop.feeds) != 1:
+            return self
+        speed = float(f"{loop.feeds[0] * 60:.12g}")
+        if not SMALLEST <= speed <= LARGEST:
+            return self
+        return contour_request(self.table.model_copy(update={"speed_m_min": speed}))
+
+    def lacks_speed(self, loop: Loop) -> str:
+        """Return why there is no speed along a loop and what to do, "" if there is one."""
+        if self.speed > 0:
+            return ""
+        said = listed([f"{feed * 60:.4g}" for feed in loop.feeds], 5)
+        got = (
+            f"{said} m/min along {loop.name!r} in its program"
+            if said
+            else f"none for {loop.name!r}"
+        )
+        example = f"{max(loop.feeds) * 60:.4g}" if loop.feeds[1:] else "3"
+        return f"expected one speed, got {got}; add, for example, speed_m_min = {example}"
 
     def _of_size(self, loop: Loop) -> ContourSpec:
         """Return how a loop is cut: as a small hole if it is one.
@@ -364,7 +391,8 @@ class ContourSpec:
 
 def contour_request(table: ContourTable) -> ContourSpec:
     """Return what a [[contour]] table asks for, in SI."""
-    angle, step, speed = table.axis_tolerance_deg, table.time_step_ms, table.speed_m_min / 60
+    angle, step = table.axis_tolerance_deg, table.time_step_ms
+    speed = 0.0 if table.speed_m_min is None else table.speed_m_min / 60
     return ContourSpec(
         pick=table.pick or "",
         name=table.name or table.pick or "",

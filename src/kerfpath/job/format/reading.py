@@ -208,14 +208,18 @@ class Job:
         Raises
         ------
         InputError
-            A loop does not exist or is picked twice, an open line has a key that needs a closed
-            loop, a name that is switched off is no contour, or every contour is switched off.
+            A loop does not exist or is picked twice, has no speed, or is an open line with a key
+            that needs a closed loop; a name that is switched off is no contour, or every contour
+            is switched off.
         """
         tasks, faults = list[ContourSpec](), list[InputError]()
         for number, table in enumerate(self.contours):
             try:
                 for task in table.expanded(part):
-                    if part.loop(task.pick).kind == "open":
+                    loop = part.loop(task.pick)
+                    if lacks := task.lacks_speed(loop):
+                        raise refusal_at(self.path, ("contour", number, "speed_m_min"), lacks)
+                    if loop.kind == "open":
                         self._require_open(task, number)
                     tasks.append(task)
             except InputError as fault:

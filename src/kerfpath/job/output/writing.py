@@ -125,7 +125,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         )
         for cut in outcome.cuts
     ]
-    speeds = sorted({task.speed * 60 for task in job.contours})
+    speeds = sorted({cut.request.task.speed * 60 for cut in outcome.cuts})
     robot, options = job.robot, job.options
     n = robot.arm.joints
     velocity, acceleration = (np.degrees(v[:n]).round(1) for v in robot.speed_limits())

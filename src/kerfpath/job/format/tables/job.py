@@ -410,6 +410,19 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
+    def _speeds_are_known(self) -> JobFile:
+        """Require a speed of each contour, unless the drawing may say it."""
+        if self.part.may_say_speeds:
+            return self
+        for i, table in enumerate(self.contour):
+            if table.speed_m_min is None:
+                field = ContourTable.model_fields["speed_m_min"]
+                said, example = str(field.description), (field.examples or [""])[0]
+                remedy = f"add, for example, speed_m_min = {example}"
+                raise fault(said, "nothing", remedy, ("contour", i, "speed_m_min"))
+        return self
+
+    @model_validator(mode="after")
     def _technique_of_process(self) -> JobFile:
         for i, table in enumerate(self.contour):
             if table.technique is not None and self.process is None:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from kerfpath.arrays import Array, freeze
-from kerfpath.cad import EDGE_TURN, GAP, LEAST_EDGE_TURN, UNITS_MM, Loop, Machine, Part
+from kerfpath.cad import EDGE_TURN, GAP, LEAST_EDGE_TURN, SUFFIXES, UNITS_MM, Loop, Machine, Part
 from kerfpath.errors import InputError
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.tables.process import Word
@@ -297,6 +297,11 @@ class PartTable(Table):
             raise fault("section and section_mm", "one", f"add {missing}", (missing,))
         return self
 
+    @property
+    def may_say_speeds(self) -> bool:
+        """Whether the drawing is the program of a machine, in which feeds may be the speeds."""
+        return SUFFIXES.get(Path(self.file).suffix.lower()) == "NC program"
+
     def drawing(self, folder: Path) -> Drawing:
         """Return the drawing; its path is relative to `folder`."""
         return Drawing(
@@ -359,7 +364,7 @@ class ContourTable(Table):
     technique: Annotated[
         Word | None, key("a technique of the chart that [process] names", '"small-hole"')
     ] = None
-    speed_m_min: Annotated[Positive, key("a number above 0, in m/min", "9")]
+    speed_m_min: Annotated[Positive | None, key("a number above 0, in m/min", "9")] = None
     spacing_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
     time_step_ms: Annotated[Positive | None, key("a number above 0, in ms", "20")] = None
     count: Annotated[
