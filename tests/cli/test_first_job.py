@@ -228,23 +228,44 @@ def test_a_small_circle_is_slower_by_the_lag_of_the_joints(tmp_path):
     assert set(speeds.values()) == {3.0}
 
 
-def test_a_job_of_some_of_many_holes_says_how_to_take_all(tmp_path):
-    path, job = tmp_path / "plate.dxf", tmp_path / "plate.toml"
+def plate(path, *holes):
+    """A DXF of a plate with round holes, (number, radius) each."""
     drawing = ezdxf.new(units=4)
-    drawing.modelspace().add_lwpolyline([(0, 0), (200, 0), (200, 90), (0, 90)], close=True)
-    for k in range(7):
-        drawing.modelspace().add_circle((20 + 25 * k, 30), 8)
+    space = drawing.modelspace()
+    radii = [radius for number, radius in holes for _ in range(number)]
+    width = 20 * len(radii) + 20
+    space.add_lwpolyline([(0, 0), (width, 0), (width, 90), (0, 90)], close=True)
+    for k, radius in enumerate(radii):
+        space.add_circle((20 + 20 * k, 30), radius)
     drawing.saveas(path)
-    assert "pick_all" not in job_text(read(path), job)  # eight loops: all are in it
-    drawing.modelspace().add_circle((20, 60), 6)
-    drawing.saveas(path)
+    return path
+
+
+def test_a_job_has_all_loops_and_one_table_for_many_alike(tmp_path):
+    path, job = plate(tmp_path / "plate.dxf", (7, 8.0), (5, 4.0), (3, 9.0)), tmp_path / "plate.toml"
     text = job_text(read(path), job)
-    assert "pick_all" in text
+    job.write_text(text)
+    tasks = [each.task for each in prepare(read_job(job)).contours]
+    assert sorted(task.pick for task in tasks) == sorted(loop.name for loop in read(path).loops)
+    # Two groups by their size; the three largest and the outline by name.
+    assert (text.count("[contour.pick_all]"), text.count("pick = ")) == (2, 4)
+    assert "16 of 16 loops" in text
+    by_size = {}
+    for task in tasks:
+        loop = read(path).loop(task.pick)
+        by_size.setdefault(loop.diameter and round(loop.diameter, 6), set()).add(task.speed)
+    assert {len(speeds) for speeds in by_size.values()} == {1}
+
+
+def test_a_job_of_some_of_very_many_holes_says_how_to_take_all(tmp_path):
+    path, job = plate(tmp_path / "plate.dxf", (260, 8.0)), tmp_path / "plate.toml"
+    text = job_text(read(path), job)
+    assert "250 of 261 loops" in text
     instead = '[contour.pick_all]\nkind = "inner"'
+    assert instead.split("\n")[1] in text[: text.index("[[contour]]")]
     table = "[[contour]]\nspeed_m_min = 2\nspacing_mm = 1.6\n" + instead
-    head = text[: text.index("[[contour]]")]
-    job.write_text(head + table)
-    assert len(prepare(read_job(job)).contours) == 8
+    job.write_text(text[: text.index("[[contour]]")] + table)
+    assert len(prepare(read_job(job)).contours) == 260
 
 
 def test_a_loop_all_the_way_round_comes_with_the_lines_of_a_rotary_axis(tmp_path):

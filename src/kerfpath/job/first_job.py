@@ -23,16 +23,18 @@ PLACEHOLDER = "abb_irb4600_60_205"
 """The robot of a job that no robot was given for."""
 REACH = 2.0
 """Reach of a robot for which the library has none, m."""
-MOST_LOOKED_AT = 40
-"""Most loops among which those of a first job are chosen; the longest are taken."""
+MOST_LOOPS = 250
+"""Most loops that a first job looks at, the longest: so many are planned in some minutes."""
+FEW = 3
+"""Most loops alike that are named one by one; more share a table that picks them by their size."""
 BELOW = np.radians(20.0)
 """Angle by which the beam may come from below the horizontal."""
-MOST_LOOPS = 8
-"""Most loops in a first job."""
 NODES = 400
 """Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
 """Distance between nodes, mm, unless a curve needs less or a loop would have too many."""
+SIZE_STEP = 1e-5
+"""To which sizes of loops that are picked by them are rounded, m."""
 CLOSEST, CLOSER = 0.25, 0.8
 """Distance between nodes, mm, that is not reduced again, and the factor that reduces it."""
 CHORD = 5e-5
@@ -109,7 +111,7 @@ language = "{language}"
 def job_text(
     part: Part, job: Path, *, robot: str | None = None, drawing: Drawing | None = None
 ) -> str:
-    """Return a job that cuts the longest loops of a part, placed in front of the robot.
+    """Return a job that cuts the loops of a part, placed in front of the robot.
 
     The loops are closed ones, or open lines if there are no others, and such as the beam need not
     come from below for, if there are any.
@@ -138,11 +140,11 @@ def job_text(
             f"{part.path}: every loop has a gap; `kerfpath contours {part.path}` shows how wide: "
             "give --gap-mm above it"
         )
-    longest = sorted(main, key=lambda loop: loop.length)[-MOST_LOOKED_AT:]
+    longest = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
     along = {loop.name: part.contour(loop.name, closed=False) for loop in longest}
     rpy = _turn(along)
     level = [loop for loop in longest if _is_level(along[loop.name], rpy)]
-    chosen = (level or longest)[-MOST_LOOPS:]
+    chosen = level or longest
     used = library_robot(robot or PLACEHOLDER)
     dense = [along[loop.name] for loop in chosen]
     axes = [contour.axes for contour in dense]
@@ -165,17 +167,15 @@ def job_text(
         rpy=list(rpy),
         cut=_below([loop for loop in longest if level and loop not in level])
         + _cut(part, chosen, lines if main is not lines else ()),
-        more=MORE if len(main) > len(longest) or len(level or longest) > MOST_LOOPS else "",
+        more=MORE if len(main) > len(longest) else "",
     )
     tail = TAIL.format(
         feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
         sequence=SEQUENCE if chosen[1:] else "",
         language=language,
     )
-    contours = (
-        _contour(loop, _spacing(part, along)) for loop, along in zip(chosen, dense, strict=True)
-    )
-    return head + next(filter(None, turning), "") + "".join(contours) + tail
+    contours = _contours(part, [along[loop.name] for loop in chosen])
+    return head + next(filter(None, turning), "") + contours + tail
 
 
 def _turning(loop: str, along: Contour, placed: Array, unit: str) -> str:
@@ -270,6 +270,42 @@ def _cut(part: Part, chosen: Sequence[Loop], aside: Sequence[Loop]) -> str:
     )
 
 
+def _contours(part: Part, chosen: Sequence[Contour]) -> str:
+    """Return the [[contour]] tables of loops; many alike share one that picks exactly these."""
+    spacings: dict[object, float] = {}
+    alike: dict[str, list[Loop]] = {}
+    for along in chosen:
+        loop = part.loop(along.name)
+        size = loop.surface, loop.diameter and round(loop.diameter, 6), round(loop.length, 6)
+        if size not in spacings:
+            spacings[size] = _spacing(part, along)
+        alike.setdefault(f"{_speed_lines(loop)}spacing_mm = {spacings[size]:g}\n", []).append(loop)
+    tables = []
+    for lines, loops in alike.items():
+        picked = _picked(part, loops) if len(loops) > FEW else None
+        if picked is not None:
+            tables.append(f"[[contour]]\n{lines}[contour.pick_all]\n{picked}\n")
+            continue
+        tables += [f"[[contour]]\npick = {toml_value(loop.name)}\n{lines}\n" for loop in loops]
+    return "".join(tables)
+
+
+def _picked(part: Part, loops: Sequence[Loop]) -> str | None:
+    """Return the lines of a [contour.pick_all] that picks these loops alone; None if none does."""
+    kind, names = loops[0].kind, {loop.name for loop in loops}
+    for name in ("diameter", "length"):
+        sizes = [getattr(loop, name) for loop in loops]
+        if None in sizes:
+            continue
+        low = np.floor(min(sizes) / SIZE_STEP) * SIZE_STEP
+        high = np.ceil(max(sizes) / SIZE_STEP) * SIZE_STEP
+        size = [float(f"{end * 1e3:.6g}") for end in (low, high)]
+        ends = {name: (size[0] / 1e3, size[1] / 1e3)}
+        if low > 0 and {loop.name for loop in part.pick(kind=kind, **ends)} == names:
+            return toml_lines({"kind": kind, f"{name}_mm": size})
+    return None
+
+
 def _spacing(part: Part, along: Contour) -> float:
     """Return a distance between nodes, mm, whose chords are close to the curve."""
     spacing = max(SPACING, round(along.length * 1e3 / NODES, 1))
@@ -281,7 +317,8 @@ def _spacing(part: Part, along: Contour) -> float:
     return spacing
 
 
-def _contour(loop: Loop, spacing: float) -> str:
+def _speed_lines(loop: Loop) -> str:
+    """Return the line of the speed along a loop: a guess, or the feed of its program."""
     speed = _speed(loop)
     slower = "" if speed == SPEED else "       # guess: slower, as the joints lag on a small circle"
     said = f"speed_m_min = {speed:g}{slower}"
@@ -290,7 +327,7 @@ def _contour(loop: Loop, spacing: float) -> str:
         said = f"# speed_m_min: by default the feed of the program, {own} m/min"
         if loop.feeds[1:]:
             said = f"speed_m_min = {max(loop.feeds) * 60:.4g}   # the program has feeds of {own}"
-    return f"[[contour]]\npick = {toml_value(loop.name)}\n{said}\nspacing_mm = {spacing:g}\n\n"
+    return f"{said}\n"
 
 
 def _speed(loop: Loop) -> float:
