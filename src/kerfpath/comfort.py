@@ -19,7 +19,8 @@ c3^2) sin(elbow) shoulder sin(wrist), that of a UR arm a2 a3 sin(elbow) shoulder
 these three zeros, and only there, such arms lose a direction of motion. Sources: B. Siciliano et
 al., "Robotics: Modelling, Planning and Control" (2009), section 3.3; T. Yoshikawa, "Manipulability
 of robotic mechanisms", IJRR 4(2), 1985. The singularities of a five-axis wrist depend on the tool,
-which its manipulability includes. A seven-axis arm has those of its other joints with joint 3 held.
+which its manipulability includes. An arm of seven axes with a spherical shoulder and
+wrist has those of its other joints with joint 3 held.
 """
 
 from __future__ import annotations

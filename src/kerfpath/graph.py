@@ -246,7 +246,7 @@ def build(
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     external : (K, X, E) rad or m, optional
-        Values of the joints that a pose leaves free (joint 3 of a seven-axis arm, then the external
+        Values of the joints that a pose leaves free (one of a seven-axis arm, then the external
         axes), in X variants of each tilt; default: a grid in the steps of these joints.
     progress : callable, optional
         Called with the number of nodes done since the last call.
@@ -318,7 +318,7 @@ def build(
 def external_grid(robot: Robot) -> Array:
     """Return all combinations (X, E) of samples of the joints that a pose leaves free, rad or m.
 
-    These are joint 3 of a seven-axis arm and the external axes.
+    These are one joint of a seven-axis arm and the external axes.
 
     Raises
     ------

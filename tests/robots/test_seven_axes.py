@@ -182,10 +182,15 @@ def test_arms_of_seven_axes_that_are_not_of_this_kind_are_refused(lbr):
         origins[joint] = origins[joint] @ pose(xyz, Rotation.from_rotvec(rotvec).as_matrix())
         return KinematicChain(origins=origins, axes=chain.axes, end=chain.end)
 
-    for joint, where in ((3, "3, 4 and 5"), (5, "5, 6 and 7"), (1, "1, 2 and 3")):
-        with pytest.raises(InputError, match=f"axes {where} miss a common point.*other seven-axis"):
-            recognise(moved(joint, [0.08, 0, 0]))  # 82.5 mm at the elbow of a Franka arm
-    with pytest.raises(InputError, match="axes 4 and 5 are not at right angles"):
-        recognise(moved(4, [0, 0, 0], [0.1, 0, 0]))
+    # 82.5 mm at the elbow of a Franka arm: not this kind, but another.
+    for joint, other in ((3, "shoulder"), (6, "wrist"), (1, "shoulder")):
+        assert recognise(moved(joint, [0.08, 0, 0]))[0].kinematics == f"offset_{other}"
+    assert recognise(moved(4, [0, 0, 0], [0.1, 0, 0]))[0].kinematics == "offset_shoulder"
+    chain = moved(1, [0.02, 0, 0])
+    with pytest.raises(
+        InputError, match=r"1, 2 and 3 miss.*5, 6 and 7 miss.*1, 2 and 3 miss.*other seven-axis"
+    ):
+        recognise(moved(5, [0.02, 0, 0]))
+    chain = chain_of(lbr)
     with pytest.raises(InputError, match=r"nearly an arm of seven axes.*write.*more digits$"):
         recognise(moved(3, [2e-5, 0, 0]))

@@ -73,8 +73,8 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
 
     "linear": from pose to pose the tip moves straight and the tool turns evenly about one axis, as
     in linear moves; the joints follow by inverse kinematics. "joint": the joints move evenly. In
-    both, external axes and joint 3 of a seven-axis arm move evenly; the line is straight in the
-    part.
+    both, external axes and the free joint of a seven-axis arm move evenly; the line is straight in
+    the part.
     """
     K, dq = len(plan.q), joint_increments(plan)
     f = np.linspace(0.0, 1.0, parts + 1)

@@ -338,7 +338,7 @@ def branch_of(robot: Robot, q: Array) -> int:
 def follow_poses(robot: Robot, T: Array, q0: Array, free: Array | None = None) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach.
 
-    `free` (K, E) rad and m has the joints that a pose leaves free: joint 3 of a seven-axis arm, and
+    `free` (K, E) rad and m has the joints that a pose leaves free: one of a seven-axis arm, and
     external axes.
     """
     if free is not None and robot.externals:

@@ -43,7 +43,7 @@ from kerfpath.setup import Setup
 # Smooth courses of external axes and elbows, from a search over coarse samples of these joints.
 #
 # Rails and tables are slow compared with the arm, and a grid of their values would quantise their
-# acceleration. The same holds for joint 3 of a seven-axis arm, which is treated as one of them.
+# acceleration. The same holds for the free joint of a seven-axis arm, treated as one of them.
 # So the best ways through coarse samples are found, and a course is the smoothest curve that
 # stays near one. Gamma is planned again along the course, and both are refined together by the
 # true kinematics.
@@ -55,7 +55,7 @@ GENTLE = Style(1e6, 1.0)
 STYLES = (Style(1.0, 1.0), Style(8.0, 1.0), Style(1.0, 8.0))
 """Styles of the courses that are tried."""
 VALLEYS = 5
-"""Most local optima of joint 3 at the last node in which courses end."""
+"""Most local optima of the free joint at the last node in which courses end."""
 
 
 def external_course(

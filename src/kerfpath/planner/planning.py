@@ -304,8 +304,8 @@ def plan(
         The layered graph of this task, from `layered_graph`.
     external : (K, E) rad or m, optional
         Values of the robot's external axes at every node, from which they are refined; for a
-        seven-axis arm, those of joint 3 come first. Default: the method "continuous" looks for a
-        smooth course, the others search a grid in the steps of these joints.
+        seven-axis arm, those of its free joint come first. Default: the method "continuous" looks
+        for a smooth course, the others search a grid in the steps of these joints.
     start_q, end_q : (n,) rad, optional
         Where the robot stands before the cut, and where it goes after it: `Plan.approach` and
         `Plan.retreat` are the moves there, straight or around what is in the way of a cell. Of the

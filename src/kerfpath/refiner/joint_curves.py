@@ -17,7 +17,7 @@ DERIVATIVE_STEP = 1e-5
 class JointCurves:
     """Joints q_k of every node in its posture, by the true kinematics.
 
-    The free variables of a node are gamma, rad, joint 3 of a seven-axis arm, and the external
+    The free variables of a node are gamma, rad, one joint of a seven-axis arm, and the external
     axes, rad or m, in this order: F = 1 + E numbers.
 
     Parameters

@@ -89,13 +89,13 @@ class Arm:
 
     Parameters
     ----------
-    kinematics : {"opw", "ur", "five", "srs", "general"}
+    kinematics : {"opw", "ur", "five", "srs", "offset_shoulder", "offset_wrist", "general"}
         The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
         Lengths, m. "opw" and "five": a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur
         2014; for a five-axis arm c4 runs along the forearm to the head's flange at q5 = 0). "ur":
         d1, a2, a3, d4, d5, d6 (Denavit-Hartenberg, as Universal Robots publishes them). "srs": c1,
-        c2, c3, c4 from foot to shoulder, elbow, wrist and flange. "general": none, see `chain`.
+        c2, c3, c4 from foot to shoulder, elbow, wrist and flange. The others: none, see `chain`.
     sign : (n,)
         +1 or -1: q_model = sign * q - offset.
     offset : (n,) rad

@@ -12,7 +12,8 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import enclosure, enclosure_ur, five, kinematics, srs, ur
-from kerfpath.robots import general
+from kerfpath.kernels import seven as offset
+from kerfpath.robots import general, seven
 
 EIGHT = tuple(
     "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("plus", "minus"))
@@ -145,6 +146,28 @@ FAMILIES = {
             forward_all=srs.forward_all,
             inverse_all=srs.inverse_all,
             given=2,
+        ),
+        Family(
+            name="offset_shoulder",
+            words="arm of seven axes with an offset shoulder and a spherical wrist",
+            joints=7,
+            lengths=(),
+            postures=EIGHT,
+            model=seven.offset_shoulder,
+            forward_all=offset.forward_all,
+            inverse_all=offset.inverse_all,
+            given=0,
+        ),
+        Family(
+            name="offset_wrist",
+            words="arm of seven axes with a spherical shoulder and an offset wrist",
+            joints=7,
+            lengths=(),
+            postures=EIGHT,
+            model=seven.offset_wrist,
+            forward_all=offset.forward_all,
+            inverse_all=offset.inverse_all,
+            given=6,
         ),
         Family(
             name="general",

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -61,6 +62,22 @@ class _Lines:
     def distance(self, point: Array, i: int) -> float:
         """Return the distance of a point from axis i, m."""
         return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
+
+    def apart(self, groups: Sequence[Sequence[int]]) -> str:
+        """Say which axes of the groups do not meet in one point each; "" if all do."""
+        for group in groups:
+            which = list(group)
+            words = ", ".join(str(i + 1) for i in which[:-1]) + f" and {which[-1] + 1}"
+            for i, j in pairwise(which):
+                if np.linalg.norm(np.cross(self.along[i], self.along[j])) < NEARLY:
+                    return f"axes {i + 1} and {j + 1} are parallel"
+            point = self.meet(which[1], which[0])
+            off = max(self.distance(point, i) for i in which)
+            if off > EXACT:
+                return f"axes {words} miss a common point by {off * 1e3:.3g} mm"
+            if self.distance(point, 3) < NEARLY:
+                return f"axes {words} meet on axis 4"
+        return ""
 
     def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
         """Say which axes i and i + 1 are not parallel, or not square, as given; "" if all are."""
@@ -125,6 +142,11 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> tuple[Arm, 
             + (", or read the arm as written with a snap of 0" if n == 6 else "")
         )
     if n == 7:
+        for name, meeting in MEETING.items():
+            misfit = lines.apart(meeting)
+            if not misfit:
+                return Arm(kinematics=name, geometry={}, chain=chain), ()
+            misfits.append(f"not an {FAMILIES[name].words}, because {misfit}")
         raise InputError(
             f"{'; '.join(misfits)}: other seven-axis arms are not supported. If the first joint is "
             "an external axis, name the link that the arm is mounted on as mount"
@@ -312,5 +334,10 @@ def _tidy(T: Array) -> Array:
     return np.eye(4) if np.abs(T - np.eye(4)).max() < NONE else T
 
 
+MEETING = {
+    "offset_shoulder": ((1, 2), (4, 5, 6)),
+    "offset_wrist": ((0, 1, 2), (4, 5)),
+}
+"""Families of seven axes that the chain itself models: the axes (from 0) that meet in a point."""
 DERIVED = {6: (("opw", _opw), ("ur", _ur)), 7: (("srs", _srs),)}
 """For each number of joints, the closed-form families and the function that fits each to axes."""

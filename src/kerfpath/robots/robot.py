@@ -102,7 +102,8 @@ class Robot:
 
     Joint vectors have the order and zeros of the robot's own description (its URDF where `frames`
     says so). Poses are those of the flange in the robot base, with z along the last axis and out of
-    the flange. A pose leaves joint 3 of a seven-axis arm free, like external axes; plans choose it.
+    the flange. A pose leaves one joint of a seven-axis arm free, like external axes; plans choose
+    it: joint 3, with an offset shoulder joint 1, with an offset wrist joint 7.
 
     Parameters
     ----------
@@ -116,8 +117,8 @@ class Robot:
     externals : tuple of ExternalAxis
         Rails and positioners; they are the last columns of q and of the limits. See `on_rail`.
     elbow_step : float rad, optional
-        For a seven-axis arm: largest step between samples of joint 3 where the exact search takes
-        it on a grid, see `with_elbow_step`.
+        For a seven-axis arm: largest step between samples of its free joint where the exact search
+        takes it on a grid, see `with_elbow_step`.
     axis_3 : {"", "serial", "horizontal"}
         What axis 3 of the controller measures: joint 3, or the upper arm from the horizontal; ""
         means not known, and then no program that contains axis 3 is written.
@@ -567,7 +568,7 @@ class Robot:
         T : (4, 4) or (B, 4, 4)
             Flange poses, m.
         given : float or (B,) rad, optional
-            Value of joint 3 of a seven-axis arm; not allowed for other arms.
+            Value of the free joint of a seven-axis arm (`free`); not allowed for other arms.
         within_limits : bool
             True: all postures, all turns inside the joint limits. False: all postures, joints in
             (-pi, pi], limits ignored.
@@ -711,7 +712,7 @@ class Robot:
         return loaded
 
     def with_elbow_step(self, step: float) -> Robot:
-        """Return this robot with joint 3 sampled in steps of at most `step` rad on a grid.
+        """Return this robot with its free joint sampled in steps of at most `step` rad on a grid.
 
         Methods "exact", "paper" and "known" need it for a seven-axis arm.
 

@@ -62,8 +62,8 @@ End = Literal["start", "end"]
 def back_off(plan: Plan, end: End, retract: float) -> Array:
     """Return the joints (n,) rad after backing off along the tool axis from an end of a plan.
 
-    The posture is kept, endless joints stay on their turn, and external axes and joint 3 of a
-    seven-axis arm do not move.
+    The posture is kept, endless joints stay on their turn, and external axes and the free joint
+    of a seven-axis arm do not move.
 
     Parameters
     ----------

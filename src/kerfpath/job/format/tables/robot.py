@@ -537,7 +537,7 @@ class RobotTable(Table):
         ),
     ] = None
     elbow_step_deg: Annotated[
-        Positive | None, key("a number above 0, the step of joint 3 of seven, in deg", "10")
+        Positive | None, key("a number above 0, the step of the free joint of seven, in deg", "10")
     ] = None
     response: ResponseTable | None = None
     external: External = ()
