@@ -216,7 +216,7 @@ def new(
 ) -> None:
     """Write a first job for a drawing, with comments; what is guessed in it is marked.
 
-    The job cuts the longest loops of the outer side, or the longest open lines if there are no
+    The job cuts the loops of the outer side, the 250 longest, or the open lines if there are no
     loops, at a guessed speed, with the beam from above and the part in front of the robot. A file
     that exists already is never overwritten.
 

@@ -300,8 +300,10 @@ def _picked(part: Part, loops: Sequence[Loop]) -> str | None:
         low = np.floor(min(sizes) / SIZE_STEP) * SIZE_STEP
         high = np.ceil(max(sizes) / SIZE_STEP) * SIZE_STEP
         size = [float(f"{end * 1e3:.6g}") for end in (low, high)]
-        ends = {name: (size[0] / 1e3, size[1] / 1e3)}
-        if low > 0 and {loop.name for loop in part.pick(kind=kind, **ends)} == names:
+        ends = size[0] / 1e3, size[1] / 1e3
+        by_size = (ends, None) if name == "diameter" else (None, ends)
+        found = part.pick(kind=kind, diameter=by_size[0], length=by_size[1]) if low > 0 else ()
+        if {loop.name for loop in found} == names:
             return toml_lines({"kind": kind, f"{name}_mm": size})
     return None
 
