@@ -22,7 +22,7 @@ MOST = 300
 
 def needs_its_extra(package):
     """What cannot be imported here; it has no data objects."""
-    assert package == "kerfpath.compas"
+    assert package in ("kerfpath.compas", "kerfpath.robodk")
 
 
 def public_classes():
@@ -30,7 +30,12 @@ def public_classes():
     for module in pkgutil.walk_packages(kerfpath.__path__, "kerfpath.", needs_its_extra):
         inner = module.name.split(".")[1:]
         # Public is what packages list; the kernels' tuples of arrays are nobody's to print.
-        if not (module.ispkg or len(inner) == 1) or inner[0] in ("cli", "compas", "kernels"):
+        if not (module.ispkg or len(inner) == 1) or inner[0] in (
+            "cli",
+            "compas",
+            "kernels",
+            "robodk",
+        ):
             continue
         for value in vars(importlib.import_module(module.name)).values():
             if (

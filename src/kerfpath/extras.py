@@ -19,6 +19,7 @@ NEEDS = {
         "tree_sitter_toml", "typer",
     ),
     "report": ("jinja2", "plotly"),
+    "robodk": ("robodk",),
     "studio": ("starlette", "uvicorn", "websockets"),
     "tables": ("pandas",),
 }  # fmt: skip

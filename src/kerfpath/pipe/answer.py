@@ -20,6 +20,7 @@ from kerfpath.arrays import Array, Ints, as_pose, floats, integers, positive, sc
 from kerfpath.cell import Body, Cell, Hull, Mesh, Shape, allowed_pairs, cell_of, link_bodies
 from kerfpath.contour import Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.pipe.station import station_robot
 from kerfpath.planner import plan
 from kerfpath.plans import Plan, TransferMove, node_rates
 from kerfpath.robots import Robot, chain_of
@@ -49,22 +50,28 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         "urdf" (text), "base", "tip" (links), "joints" (names from base to tip), "start" (n,) rad,
         "acceleration" rad/s^2, "gamma_step" rad, "T_world_base", "T_flange_tip" (4, 4) m, "points",
         "axes" and "x" (K, 3) m of the waypoints in the world ("x" None: the rotation about the axis
-        is free), "name", "speed" m/s, "max_step" m. With a "cell" the motion is clear: "meshes" of
-        the description by their file names, "disabled" pairs of links, and "bodies": "name", "of"
-        (what it belongs to), "mesh", "T" in the flange if "held" and else in the world, "touch"
-        (names). A mesh has "vertices" (V, 3) m and "triangles" (F, 3).
+        is free), "name", "speed" m/s, "max_step" m. Those of `kerfpath.robodk` have a "station"
+        (see `station_robot`) in place of "urdf", "base", "tip", "joints" and "T_world_base": points
+        are in the robot base of the station, "start" may be None, and the path is a curve, whose
+        nodes are at its ends and corners and evenly between. With a "cell" the motion is clear:
+        "meshes" of the description by their file names, "disabled" pairs of links, and "bodies":
+        "name", "of" (what it belongs to), "mesh", "T" in the flange if "held" and else in the
+        world, "touch" (names). A mesh has "vertices" (V, 3) m and "triangles" (F, 3).
 
     Returns
     -------
     dict
-        "joints", "time", "q", "v", "a", "waypoints" (numbers of their points), "cost", and
-        "seconds" of planning. Or "error" ("start": it collides there, "reach", "path" or
+        "joints", "time", "q", "v", "a", "waypoints" (numbers of their points; for a curve of all
+        nodes), "cost", and "seconds" of planning; for a station also "robot" (its id),
+        "acceleration" (its source), "apart_mm" and "apart_deg" (of its forward kinematics), and
+        "points" and "axes" of the nodes, with "chord", the largest distance (m) of the curve from
+        the straight lines between them. Or "error" ("start": it collides there, "reach", "path" or
         "input"), "message", and for "reach" the number of the "waypoint".
     """
     begun, path = time.perf_counter(), None
     try:
-        path = _path_of(request)
-        made = _planned(request, path)
+        path = _curve_of(request) if "station" in request else _path_of(request)
+        made, more = _planned(request, path)
     except InputError as error:
         return {"error": "input", "message": str(error)}
     except NoFeasiblePath as none:
@@ -77,12 +84,13 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         return {"error": "path", "message": said}
     timed, first = _from_stop_to_stop(made)
     return {
-        "joints": list(request["joints"]),
+        "joints": list(request.get("joints", made.robot.joint_names)),
         **{name: values.tolist() for name, values in zip("qva", timed[1:], strict=True)},
         "time": timed[0].tolist(),
         "waypoints": (path.waypoints + first).tolist(),
         "cost": made.cost,
         "seconds": time.perf_counter() - begun,
+        **more,
     }
 
 
@@ -91,12 +99,14 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _Path(NamedTuple):
-    """The nodes of a path, and the number of the node at each waypoint."""
+    """A path in the world, the number of the node at each waypoint, and its distance (m) from it.
 
-    points: Array
-    axes: Array
-    x: Array | None
+    The distance is that of a curve from the straight lines between the nodes.
+    """
+
+    contour: Contour
     waypoints: Ints
+    chord: float = 0.0
 
 
 def _path_of(request: Mapping[str, Any]) -> _Path:
@@ -125,11 +135,29 @@ def _path_of(request: Mapping[str, Any]) -> _Path:
     every = np.arange(len(points))
     fine = np.array([np.interp(at, every, each) for each in points.T]).T
     if request["x"] is None:
-        return _Path(fine, _turned_evenly(axes, at), None, waypoints)
+        contour = Contour(fine, _turned_evenly(axes, at), closed=False, name=request["name"])
+        return _Path(contour, waypoints)
     x = floats(request["x"], "x of waypoints", (len(points), 3))
     frames = np.stack([x, np.cross(axes, x), axes], axis=-1)
     turned = Slerp(every, Rotation.from_matrix(frames))(at).as_matrix()
-    return _Path(fine, turned[:, :, 2], turned[:, :, 0], waypoints)
+    axes, x = turned[:, :, 2], turned[:, :, 0]
+    return _Path(Contour(fine, axes, closed=False, x=x, name=request["name"]), waypoints)
+
+
+def _curve_of(request: Mapping[str, Any]) -> _Path:
+    """Return a curve at its ends and corners, and at evenly spaced nodes between them."""
+    points = floats(request["points"], "curve", (None, 3))
+    axes = floats(request["axes"], "axes of the curve", (len(points), 3))
+    curve = Contour(points, axes, closed=False, name=request["name"])
+    nodes = curve.resample(spacing=scalar(request["max_step"], "spacing", unit="m", above=0.0))
+    if len(nodes) > MOST_NODES:
+        raise InputError(
+            f"spacing: {len(nodes)} nodes are needed, at most {MOST_NODES} are planned; make it "
+            "longer"
+        )
+    straight = np.array([np.interp(curve.s, nodes.s, each) for each in nodes.points.T]).T
+    chord = np.linalg.norm(straight - curve.points, axis=1).max()
+    return _Path(nodes, np.arange(len(nodes)), float(chord))
 
 
 def _parts(length: Array, most: float) -> Ints:
@@ -158,29 +186,46 @@ def _turned_evenly(axes: Array, at: Array) -> Array:
 # The plan, with the robot and the cell of the request.
 
 
-def _planned(request: Mapping[str, Any], path: _Path) -> Plan:
-    T_base_world = as_pose(
-        np.linalg.inv(as_pose(request["T_world_base"], "T_world_base")), "T_world_base"
-    )
+def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, dict[str, Any]]:
+    """Return the plan, and what an answer says about the robot of a station."""
     tool = as_pose(request["T_flange_tip"], "T_flange_tip")
-    around = request.get("cell")
-    with TemporaryDirectory() as folder:  # the meshes of links are read for the cell
-        robot = _robot(request, {} if around is None else around["meshes"], Path(folder))
-        cell = None if around is None else _cell(robot, tool, T_base_world, around)
-    contour = Contour(path.points, path.axes, closed=False, x=path.x, name=request["name"])
-    fixed = GammaWindow(start=0.0, end=float(contour.s[-1]), low=0.0, high=0.0)
-    return plan(
-        contour,
+    around, cell, more = request.get("cell"), None, dict[str, Any]()
+    if "station" in request:
+        seen = station_robot(request["station"], request["acceleration"])
+        robot = seen.robot
+        T_base_world = as_pose(np.linalg.inv(seen.T_station_base), "T_station_base")
+        tool = as_pose(seen.T_end_flange @ tool, "T_flange_tip")
+        more = {
+            "robot": robot.id,
+            "acceleration": robot.acceleration_source,
+            "apart_mm": seen.apart_mm,
+            "apart_deg": seen.apart_deg,
+            "points": path.contour.points.tolist(),
+            "axes": path.contour.axes.tolist(),
+            "chord": path.chord,
+        }
+    else:
+        T_world_base = as_pose(request["T_world_base"], "T_world_base")
+        T_base_world = as_pose(np.linalg.inv(T_world_base), "T_world_base")
+        with TemporaryDirectory() as folder:  # the meshes of links are read for the cell
+            robot = _robot(request, {} if around is None else around["meshes"], Path(folder))
+            cell = None if around is None else _cell(robot, tool, T_base_world, around)
+    end = float(path.contour.s[-1])
+    made = plan(
+        path.contour,
         robot,
         tool=tool,
         placement=T_base_world,
         speed=scalar(request["speed"], "speed", unit="m/s", above=0.0),
         gamma_step=request["gamma_step"],
-        gamma_windows=() if path.x is None else (fixed,),
+        gamma_windows=()
+        if path.contour.x is None
+        else (GammaWindow(start=0.0, end=end, low=0.0, high=0.0),),
         cell=cell,
         start_q=request["start"],
         certify=None,
     )
+    return made, more
 
 
 def _robot(request: Mapping[str, Any], meshes: Mapping[str, Any], folder: Path) -> Robot:
