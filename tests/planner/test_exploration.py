@@ -11,7 +11,7 @@ from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.courses import can_explore, ramps, smoothed, varied, waves
+from kerfpath.planner.courses import Courses, can_explore, ramps, smoothed, varied, waves
 from kerfpath.planner.exploration import AGAIN, REFINED, REFINED_AGAIN, Exploration
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
@@ -152,6 +152,34 @@ def test_an_exploration_ends_where_the_best_motion_is_found_again(
     Exploration(task, starts).run()
     assert AGAIN <= len(ends) <= most
     assert (len(ends) == AGAIN) == (share == 1.0)
+
+
+def test_motions_of_one_posture_do_not_use_up_the_refinements_of_others(
+    circle, arm, tool, placement, monkeypatch
+):
+    """Near the fastest speed all motions of the most promising posture may break the limits."""
+    nodes = circle.resample(count=21)
+    task = planning_task(nodes, Setup.of(arm, tool, placement), PlanOptions(), speed=0.45).whole()
+    starts, tried = Starts(task, CollisionFreeSearch(task)), []
+    made = plan(nodes, arm, tool=tool, placement=placement, speed=0.45, certify=None)
+    starts.start_from(made, 0.0)
+
+    def screened(courses, *_):
+        """One course for each posture, the first one many times."""
+        alone = {int(c.posture[0]): c for c in courses if not np.ptp(c.posture)}
+        first, *others = alone.values()
+        many = [first._replace(gamma=first.gamma + 0.1 * i) for i in range(3 * REFINED)]
+        return [(starts.best.cost_after, course) for course in (*many, *others)]
+
+    def refined(course, _):
+        tried.append(int(course.posture[0]))
+        return np.inf
+
+    monkeypatch.setattr(Courses, "screened", lambda _, *given: screened(*given))
+    monkeypatch.setattr(starts, "refine_course", refined)
+    Exploration(task, starts).run()
+    assert tried.count(tried[0]) == REFINED + REFINED_AGAIN
+    assert {*tried} == {*range(arm.postures)}
 
 
 @pytest.fixture

@@ -25,7 +25,9 @@ BY_FEW = 4.0
 """How many times `Effort.worth_exploring` the gap to the value function along every few nodes may
 be: their steps pass over what a course turns back between them."""
 REFINED, REFINED_AGAIN = 5, 3
-"""Motions that are refined after the first screening, and after each later one."""
+"""Motions that are refined after the first screening, and after each later one, and in any case one
+in each posture: a score is a guess where (6) binds, and all motions of the posture that it puts
+first may end outside the limits."""
 HOPELESS = 1.25
 """Scores from this many times the best cost on are not refined: a refinement gains less."""
 ROUNDS = 2
@@ -105,20 +107,24 @@ class Exploration:
         return self._courses.screened(courses, *ways)
 
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
-        """Refine the best motions, at most so many, that are not known."""
-        tried, tally = 0, self._starts.tally
+        """Refine the best motions that are not known: so many, and the best of every posture."""
+        tried, tally, postures = 0, self._starts.tally, set[frozenset[int]]()
         for number, (score, course) in enumerate(screened):
             best, rest = self._best_cost, len(screened) - number
             if score > HOPELESS * best:
                 tally.dearer += rest
                 break
-            if tried == most or self._again == AGAIN:
+            if self._again == AGAIN:
                 tally.left += rest
                 break
-            if self._is_known(course):
+            posture = frozenset(course.posture.tolist())
+            if tried >= most and posture in postures:
+                tally.left += 1
+            elif self._is_known(course):
                 tally.alike += 1
             else:
                 tried += 1
+                postures.add(posture)
                 self._known.append(course)
                 found = self._starts.refine_course(self._courses.closed(course), score)
                 if found <= (1 + SAME_END) * best < np.inf:
