@@ -117,7 +117,7 @@ class Ends:
                 posture = int(offered[best[0]].posture[0])
                 air.keep_straight(np.flatnonzero([one.posture[0] == posture for one in offered]))
             if not changed:
-                (made,), moves = air.unrolled(best)
+                (made,), moves, _ = air.unrolled(best)
                 return replace(
                     made,
                     approach=None if self.start is None else moves[0],

@@ -194,10 +194,13 @@ class AxisCount:
         angles = rows @ np.linalg.inv(self.matrix).T
         return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
 
-    def bounds(self, robot: Robot, widest: ArrayLike) -> tuple[Array, Array]:
+    def bounds(
+        self, robot: Robot, widest: ArrayLike, *, endless: bool = False
+    ) -> tuple[Array, Array]:
         """Return the least and greatest joints (6,) rad at which no axis turns beyond a bound.
 
-        Endless joints have none. Of the axes that are bounded, each is that of one joint.
+        Endless joints have none, or with `endless` only these have. Of the axes that are bounded,
+        each is that of one joint.
 
         Parameters
         ----------
@@ -205,7 +208,7 @@ class AxisCount:
             Largest angle of each axis either way; inf for none.
         """
         bound = np.asarray(widest, dtype=np.float64)
-        free = np.isinf(bound) | robot.endless[:6]
+        free = np.isinf(bound) | (robot.endless[:6] != endless)
         ends = np.where(free, 0.0, np.stack([-bound, bound]))
         joints = self.to_joints(robot, ends)
         lower, upper = joints.min(axis=0), joints.max(axis=0)

@@ -745,6 +745,9 @@ class Language:
     bounds : callable, optional
         (robot) -> the least and greatest joints (6,) rad that its targets can express; jobs plan
         within them. None: it can express all.
+    endless_bounds : callable, optional
+        (robot) -> the same (6,) rad of endless joints, infinite of others. They turn back between
+        contours to stay within. None: it can express every turn of them.
     sayable : callable, optional
         (program, settings) -> the program as far as the language can express it; `check` warns of
         all that is left out. None: it can express all.
@@ -788,6 +791,7 @@ class Language:
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
     bounds: Callable[[Robot], tuple[Array, Array]] | None = None
+    endless_bounds: Callable[[Robot], tuple[Array, Array]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None
     ahead: bool = True
     zones: bool = True
@@ -825,6 +829,14 @@ class Language:
             arm, (low, high) = slice(robot.family.joints), self.bounds(robot)
             least[arm], most[arm] = np.maximum(least[arm], low), np.minimum(most[arm], high)
         return least, most
+
+    def turns_within(self, robot: Robot) -> tuple[Array, Array] | None:
+        """Return least and greatest angles (n,) rad of endless joints; None without bounds."""
+        if self.endless_bounds is None or not robot.endless.any() or self.refusal(robot):
+            return None
+        ends = np.array([np.full(robot.joints, -np.inf), np.full(robot.joints, np.inf)])
+        ends[:, : robot.family.joints] = self.endless_bounds(robot)
+        return ends[0], ends[1]
 
     def refusal(self, robot: Robot) -> str:
         """Return why no program in this language can move a robot; empty if one can."""

@@ -303,6 +303,7 @@ class OrderKeywords(TypedDict, total=False):
     air_speed: float
     pierce_time: float | Sequence[float]
     seconds: float
+    turns_within: tuple[ArrayLike, ArrayLike] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -333,6 +334,9 @@ class OrderOptions:
     seconds : float s
         Work limit of the order solver, see `best_order`, and time limit of each search for a way
         around; searches without a result end after `longest_search(seconds)` in total.
+    turns_within : two of (n,) rad, optional
+        Least and greatest angles of endless joints that a program can express; infinite of others.
+        Joints turn back by whole turns in transfer moves to stay within.
 
     Raises
     ------
@@ -351,6 +355,7 @@ class OrderOptions:
     air_speed: float = 1.0
     pierce_time: float | Sequence[float] = 0.0
     seconds: float = 10.0
+    turns_within: tuple[ArrayLike, ArrayLike] | None = None
 
     __repr__ = short_repr
 
@@ -779,7 +784,8 @@ def order_plans(
     ------
     NoFeasiblePath
         No candidate of a contour can be approached and left; there is no order; or there is no way
-        between two contours: the message names them, what is in the way and what was tried.
+        between two contours, also none by which an endless joint turns back: the message names
+        them, what is in the way and what was tried.
     InputError
         A length, speed or time is out of range.
     """
@@ -833,7 +839,8 @@ def order_plans(
         )
         if not places:
             raise further.mentioned_in(found)
-    made, moves = air.unrolled(order.candidates)
+    made, moves, back = air.unrolled(order.candidates, options.turns_within)
+    order = replace(order, duration=order.duration + back)
     pierce = options.pierce_time
     if isinstance(pierce, Sequence):
         pierce = tuple(pierce[offered[k][0]] for k in order.candidates.tolist())

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.cell import Cell
@@ -268,14 +269,30 @@ class MoveTimes:
             (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
         )
 
-    def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[TransferMove, ...]]:
-        """Return the plans and moves of an order, with endless joints not wrapped between them."""
+    def unrolled(
+        self, candidates: Ints, within: tuple[ArrayLike, ArrayLike] | None = None
+    ) -> tuple[tuple[Plan, ...], tuple[TransferMove, ...], float]:
+        """Return the plans and moves of an order, with endless joints not wrapped between them.
+
+        The last value is the time (s) by which moves take longer since endless joints turn back in
+        them by whole turns, to stay within angles (n,) rad.
+
+        Raises
+        ------
+        NoFeasiblePath
+            No way by which a joint turns back was found.
+        """
         legs = self._legs(candidates)
         here = self._ends[candidates[0]] if self._start is None else self._start
-        plans, moves, shift = [], [], np.zeros_like(here)
+        plans, moves, longer = [], [], 0.0
         for k, (a, b) in enumerate(legs):
             move = self._moves[a, b]
-            moves.append(replace(move, q=freeze(move.q + (here - move.q[0]))))
+            move = replace(move, q=freeze(move.q + (here - move.q[0])))
+            if within is not None and (back := self._turns_back(b, move.q[-1], within)).any():
+                turned = self._turned_back((a, b), here, move.q[-1] + 2 * np.pi * back)
+                longer += turned.duration - move.duration
+                move = turned
+            moves.append(move)
             shift = moves[-1].q[-1] - (0 if b == HOME else self._starts[b])
             if k == 0 and a != HOME:
                 plans.append(self._plans[a])
@@ -284,7 +301,35 @@ class MoveTimes:
                 here = self._ends[b] + shift
         if not legs:
             plans = [self._plans[int(candidates[0])]]
-        return tuple(plans), tuple(moves)
+        return tuple(plans), tuple(moves), longer
+
+    def _turns_back(self, b: int, there: Array, within: tuple[ArrayLike, ArrayLike]) -> Ints:
+        """Return the fewest whole turns (n,) of joints that keep a candidate within angles.
+
+        `there` (n,) rad is where a move to it ends. Joints that turn too far on it for any turns
+        stay as they are.
+        """
+        lower, upper = (np.asarray(end, dtype=np.float64) for end in within)
+        low = high = np.zeros_like(there)
+        if b != HOME:
+            on_way = np.vstack([self._starts[b], self._plans[b].q, self._ends[b]])
+            low, high = (end(axis=0) - self._starts[b] for end in (on_way.min, on_way.max))
+        least = np.ceil((lower - there - low) / (2 * np.pi))
+        most = np.floor((upper - there - high) / (2 * np.pi))
+        fewest = np.where(least > most, 0.0, np.clip(0.0, least, np.maximum(least, most)))
+        return np.asarray(np.where(self._robot.endless, fewest, 0.0), dtype=np.int64)
+
+    def _turned_back(self, leg: tuple[int, int], one: Array, two: Array) -> TransferMove:
+        """Return the move of a leg between joints (n,) rad, by exactly the turns between them."""
+        try:
+            return self._along(one, two)
+        except NoFeasiblePath as broken:
+            joints = np.flatnonzero(np.abs(two - one) > np.pi)
+            names = ", ".join(self._robot.joint_names[j] for j in joints.tolist())
+            raise broken.with_message(
+                f"{self.between_which(leg)}: {names} would have to turn back, as the program "
+                f"cannot express more turns: {broken}"
+            ) from None
 
     def _legs(self, candidates: Ints) -> list[tuple[int, int]]:
         before = [] if self._start is None else [HOME]
@@ -292,8 +337,11 @@ class MoveTimes:
         return list(pairwise([*before, *candidates.tolist(), *after]))
 
     def _planned(self, one: Array, two: Array) -> TransferMove:
+        return self._along(one, one + increments_between(one, two, self._robot.endless))
+
+    def _along(self, one: Array, two: Array) -> TransferMove:
         move = transfer_move(
-            self._robot, one, one + increments_between(one, two, self._robot.endless),
+            self._robot, one, two,
             cell=self._cell, eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
         )  # fmt: skip
         return replace(move, time=freeze(move.time / self._air_speed))

@@ -92,3 +92,17 @@ def test_bounds_of_fanuc_are_those_of_the_turn_numbers(name: str) -> None:
         counted = fanuc.posture(arm, ends, fanuc.FanucSettings(turns=turns))
         numbers = np.array([each[3:] for each in counted])[:, -2:]
         assert (np.abs(numbers) == 7).all()
+
+
+def test_endless_joints_of_a_job_turn_back_only_in_a_language_that_counts_turns(
+    tmp_path: Path,
+) -> None:
+    limits_of(tmp_path, "none")  # writes the drawing
+    for language, bounded in (("fanuc", True), ("rapid", False), ("none", False)):
+        text = JOB.format(language=language, limits="endless = [6]")
+        (tmp_path / "job.toml").write_text(text.replace("yaskawa_gp25", "fanuc_m20ia"))
+        within = read_job(tmp_path / "job.toml").turns_within
+        assert (within is not None) == bounded
+        if within is not None:
+            assert np.isinf(within[0][:5]).all()
+            assert np.degrees(within[1][5] - within[0][5]) == pytest.approx(2 * 2700, abs=0.01)

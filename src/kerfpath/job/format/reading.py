@@ -143,6 +143,12 @@ class Job:
         """The CAD file; it existed when the job was read."""
         return self.drawing.file
 
+    @property
+    def turns_within(self) -> tuple[Array, Array] | None:
+        """Least and greatest angles (n,) rad of endless joints in the program; None without any."""
+        language = languages().get(self.program.language)
+        return None if language is None else language.turns_within(self.robot)
+
     def read_part(self) -> Part:
         """Return the part in the CAD file.
 

@@ -125,6 +125,7 @@ def order_cuts(
             approach_speed=job.program.approach_speed,
             pierce_time=job.program.pierce_times([r.task.name for r in requests]),
             seconds=job.sequence.seconds,
+            turns_within=job.turns_within,
         )
     except StopEarly:
         said = "stopped before an order was found"

@@ -2,7 +2,14 @@
 
 from kerfpath.post.fanuc.controller import FanucSettings as FanucSettings
 from kerfpath.post.fanuc.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.fanuc.controller import bounds, inherited, is_reserved, rules, sayable
+from kerfpath.post.fanuc.controller import (
+    bounds,
+    endless_bounds,
+    inherited,
+    is_reserved,
+    rules,
+    sayable,
+)
 from kerfpath.post.fanuc.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.fanuc.controller import posture as posture
 from kerfpath.post.fanuc.reader import read
@@ -24,6 +31,7 @@ FANUC = Language(
     posture=posture,
     check=check,
     bounds=bounds,
+    endless_bounds=endless_bounds,
     sayable=sayable,
     assumed={"laser_output": 1},
     externals=no_settings_needed,

@@ -214,12 +214,18 @@ FEWEST_TURNS, MOST_TURNS = -8, 7
 FARTHEST_DEG = 360.0 * MOST_TURNS + 180 - 1e-3
 """Angle, either way, within which every axis has such a turn number."""
 
+WIDEST = np.radians([FARTHEST_DEG, np.inf, np.inf, FARTHEST_DEG, FARTHEST_DEG, FARTHEST_DEG])
+"""The same (6,), rad, of the axes whose turns may be counted."""
+
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
     """Return the least and greatest joints (6,) rad whose turns a configuration can hold."""
-    widest = np.full(6, np.inf)
-    widest[[0, 3, 4, 5]] = np.radians(FARTHEST_DEG)
-    return COUNT.bounds(robot, widest)
+    return COUNT.bounds(robot, WIDEST)
+
+
+def endless_bounds(robot: Robot) -> tuple[Array, Array]:
+    """Return the same joints (6,) rad of endless joints alone."""
+    return COUNT.bounds(robot, WIDEST, endless=True)
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
