@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from jobs import ROBOT_AND_HEAD
 from kerfpath import InputError, Robot
 from kerfpath.cell import allowed_pairs, caveats, cell_of, link_bodies
 from kerfpath.job import cell_of_job, read_job
-from kerfpath.urdf import read_srdf
+from kerfpath.urdf import Semantics, read_semantics, read_srdf
 
 LENGTHS = (0.3, 0.7, 0.4, 0.4, 0.2, 0.2)
 
@@ -176,3 +177,78 @@ def test_a_job_takes_it_and_its_own_distances_come_first(tmp_path: Path) -> None
     )
     with pytest.raises(InputError, match=r"robot\.srdf: expected srdf only with urdf"):
         read_job(tmp_path / "job.toml")
+
+
+def semantics(folder: Path, *lines: str) -> Semantics:
+    return read_semantics(srdf(folder, *lines), arm(folder))
+
+
+CHAIN = "<group name='arm'><chain base_link='base' tip_link='link_6'/></group>"
+
+
+def a_state(values: str, group: str = "arm") -> str:
+    joints = zip(("j6", "j1", "j2", "j3", "j4", "j5"), values.split(), strict=False)
+    inside = "".join(f"<joint name='{name}' value='{value}'/>" for name, value in joints)
+    return f"<group_state name='home' group='{group}'>{inside}</group_state>"
+
+
+def test_groups_states_and_end_effectors_are_read(tmp_path: Path) -> None:
+    found = semantics(
+        tmp_path,
+        CHAIN,
+        "<group name='wrist'><joint name='j4'/><joint name='j5'/><joint name='j6'/></group>",
+        "<group name='links'><link name='link_1'/><link name='link_2'/></group>",
+        "<group name='all'><group name='arm'/><group name='wrist'/></group>",
+        "<group name='gap'><joint name='j1'/><joint name='j3'/></group>",
+        a_state("0.6 0.1 0.2 0.3 0.4 0.5"),
+        "<end_effector name='head' parent_link='link_6' group='links' parent_group='arm'/>",
+        "<virtual_joint name='v' type='fixed' parent_frame='world' child_link='base'/>",
+        "<virtual_joint name='w' type='planar' parent_frame='odom' child_link='base'/>",
+        "<passive_joint name='j5'/>",
+        off("base", "link_2"),
+    )
+    arm_group, wrist = found.groups["arm"], found.groups["wrist"]
+    assert arm_group.joints == ("j1", "j2", "j3", "j4", "j5", "j6")
+    # In the order of the joints, whatever the order of the file.
+    np.testing.assert_array_equal(arm_group.states["home"], [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    assert (wrist.base, wrist.tip, wrist.joints) == ("link_3", "link_6", ("j4", "j5", "j6"))
+    assert found.groups["links"].joints == ("j2",)
+    assert found.others == ("all", "gap")
+    assert [(e.name, e.parent_link, e.parent_group) for e in found.end_effectors] == [
+        ("head", "link_6", "arm")
+    ]
+    assert set(found.frames) == {"base", "world"}
+    assert set(arm_group.carried) == {"link_6"}
+    assert found.disabled == {("base", "link_2"): "SRDF: Never"}
+    with pytest.raises(InputError, match=r"group 'arm': nothing drives its joints j5"):
+        found.group("arm")
+    assert found.group("links").name == "links"
+    with pytest.raises(InputError, match="a name is needed; groups that are chains: arm, links"):
+        found.group()
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["<group/>"], "expected name= in <group>"),
+        (
+            ["<group name='a'><chain base_link='base' tip_link='nil'/></group>"],
+            "<chain> names 'nil', not in the description",
+        ),
+        (
+            ["<group name='a'><chain base_link='link_6' tip_link='base'/></group>"],
+            "no joints lead from link 'link_6' to link 'base'",
+        ),
+        (["<group name='a'><joint name='nil'/></group>"], "<joint> names 'nil'"),
+        ([CHAIN, a_state("0 0 0")], "expected a value of joint 'j3', got none"),
+        ([CHAIN, a_state("0 0 x 0 0 0")], "expected one finite number for each joint"),
+        ([CHAIN, a_state("0 0 inf 0 0 0")], "expected one finite number for each joint"),
+        (["<end_effector name='a' parent_link='nil' group='b'/>"], "names 'nil'"),
+        (["<virtual_joint name='a' type='fixed' child_link='nil'/>"], "names 'nil'"),
+    ],
+)
+def test_semantics_that_contradict_the_description_are_refused(
+    tmp_path: Path, lines: list[str], said: str
+) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        semantics(tmp_path, *lines)

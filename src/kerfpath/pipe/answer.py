@@ -56,7 +56,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         nodes are at its ends and corners and evenly between. With a "cell" the motion is clear:
         "meshes" of the description by their file names, "disabled" pairs of links, and "bodies":
         "name", "of" (what it belongs to), "mesh", "T" in the flange if "held" and else in the
-        world, "touch" (names). A mesh has "vertices" (V, 3) m and "triangles" (F, 3).
+        world, "touch" (names). A mesh has "vertices" (V, 3) m and "triangles" (F, 3). In place of
+        "urdf", those of `kerfpath.ros` have the path of a "file" and folders of its "packages", by
+        name, and no "meshes"; their "end" (n,) rad is where the robot goes afterwards.
 
     Returns
     -------
@@ -65,8 +67,8 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         nodes), "cost", and "seconds" of planning; for a station also "robot" (its id),
         "acceleration" (its source), "apart_mm" and "apart_deg" (of its forward kinematics), and
         "points" and "axes" of the nodes, with "chord", the largest distance (m) of the curve from
-        the straight lines between them. Or "error" ("start": it collides there, "reach", "path" or
-        "input"), "message", and for "reach" the number of the "waypoint".
+        the straight lines between them. Or "error" ("start", "end": it collides there, "reach",
+        "path" or "input"), "message", and for "reach" the number of the "waypoint".
     """
     begun, path = time.perf_counter(), None
     try:
@@ -76,8 +78,9 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         return {"error": "input", "message": str(error)}
     except NoFeasiblePath as none:
         said = str(none)
-        if said.startswith("start_q: "):
-            return {"error": "start", "message": said}
+        for name in ("start", "end"):
+            if said.startswith(f"{name}_q: "):
+                return {"error": name, "message": said}
         if path is not None and "no admissible pose at node" in said:
             at = min(int(np.searchsorted(path.waypoints, none.node + 1)), len(path.waypoints) - 1)
             return {"error": "reach", "message": said, "waypoint": at}
@@ -208,7 +211,7 @@ def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, dict[str, A
         T_world_base = as_pose(request["T_world_base"], "T_world_base")
         T_base_world = as_pose(np.linalg.inv(T_world_base), "T_world_base")
         with TemporaryDirectory() as folder:  # the meshes of links are read for the cell
-            robot = _robot(request, {} if around is None else around["meshes"], Path(folder))
+            robot = _robot(request, around, Path(folder))
             cell = None if around is None else _cell(robot, tool, T_base_world, around)
     end = float(path.contour.s[-1])
     made = plan(
@@ -223,27 +226,34 @@ def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, dict[str, A
         else (GammaWindow(start=0.0, end=end, low=0.0, high=0.0),),
         cell=cell,
         start_q=request["start"],
+        end_q=request.get("end"),
         certify=None,
     )
     return made, more
 
 
-def _robot(request: Mapping[str, Any], meshes: Mapping[str, Any], folder: Path) -> Robot:
-    """Return the robot of the description, with the meshes of its links if there are any."""
-    text, n = str(request["urdf"]), len(request["joints"])
+def _robot(request: Mapping[str, Any], around: Mapping[str, Any] | None, folder: Path) -> Robot:
+    """Return the robot of the description, with the meshes of its links for what is around it."""
+    n, file = len(request["joints"]), folder / "robot.urdf"
     limit = positive(np.atleast_1d(request["acceleration"]), "acceleration", (None,))
-    for k, (name, mesh) in enumerate(meshes.items()):
-        (folder / f"{k}.stl").write_bytes(_stl(*_surface(mesh, name)))
-        text = text.replace(f'filename="{name}"', f'filename="{k}.stl"')
-    file = folder / "robot.urdf"
-    file.write_text(text, encoding="utf-8")
+    meshes = around is not None
+    if "file" in request:
+        file = Path(request["file"])
+    else:
+        text, given = str(request["urdf"]), around["meshes"] if around is not None else {}
+        meshes = bool(given)
+        for k, (name, mesh) in enumerate(given.items()):
+            (folder / f"{k}.stl").write_bytes(_stl(*_surface(mesh, name)))
+            text = text.replace(f'filename="{name}"', f'filename="{k}.stl"')
+        file.write_text(text, encoding="utf-8")
     try:
         return Robot.from_urdf(
             file,
             base=request["base"],
             tip=request["tip"],
             externals=None,
-            meshes=bool(meshes),
+            packages=request.get("packages"),
+            meshes=meshes,
             snap=SNAP,
             acceleration=np.tile(limit, n) if len(limit) == 1 else limit,
         )
@@ -324,15 +334,18 @@ class _Timed(NamedTuple):
 
 
 def _from_stop_to_stop(made: Plan) -> tuple[_Timed, int]:
-    """Return the approach and the path over time, and the number of the first waypoint's point."""
-    pieces = list[_Timed]()
-    if made.approach is not None and np.abs(np.diff(made.approach.q, axis=0)).max() > 1e-9:
-        pieces += _approach(made.robot, made.approach)
-    first = sum(len(piece.time) - 1 for piece in pieces)
-    return _joined([*pieces, _path(made)]), first
+    """Return moves and path over time, and the number of the first waypoint's point."""
+    before, after = (
+        list(_moved(made.robot, move))
+        if move is not None and np.abs(np.diff(move.q, axis=0)).max() > 1e-9
+        else []
+        for move in (made.approach, made.retreat)
+    )
+    first = sum(len(piece.time) - 1 for piece in before)
+    return _joined([*before, _path(made), *after]), first
 
 
-def _approach(robot: Robot, move: TransferMove) -> Iterable[_Timed]:
+def _moved(robot: Robot, move: TransferMove) -> Iterable[_Timed]:
     """Yield the straight joint motions of a move, from stop to stop."""
     for one, two, took in zip(move.q, move.q[1:], np.diff(move.time), strict=False):
         count = int(np.ceil(took / STEP_TIME)) + 1

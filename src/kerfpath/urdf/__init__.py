@@ -14,5 +14,9 @@ from kerfpath.urdf.description import joined as joined
 from kerfpath.urdf.description import read_srdf as read_srdf
 from kerfpath.urdf.description import read_urdf as read_urdf
 from kerfpath.urdf.description import require_tensor as require_tensor
+from kerfpath.urdf.semantics import EndEffector as EndEffector
+from kerfpath.urdf.semantics import Group as Group
+from kerfpath.urdf.semantics import Semantics as Semantics
+from kerfpath.urdf.semantics import read_semantics as read_semantics
 from kerfpath.urdf.tree import Joint as Joint
 from kerfpath.urdf.tree import urdf_text as urdf_text
