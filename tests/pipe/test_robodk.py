@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from conftest import ROOT
 from kerfpath.errors import InputError
+from kerfpath.pipe import answer
 from kerfpath.pipe.station import station_robot
 from kerfpath.robots import robot
 from robodk_station import (
@@ -284,6 +285,45 @@ def test_base_and_flange_of_a_station_are_fitted(name):
     there = found.T_station_base @ found.robot.forward(q) @ found.T_end_flange
     np.testing.assert_allclose(there, X @ found.robot.forward(q) @ Y, atol=1e-9)
     assert found.apart_mm < 1e-6
+
+
+@pytest.mark.parametrize("name", ["fanuc_m10ia", "abb_irb2400_155"])
+@pytest.mark.parametrize("horizontal", [True, False])
+def test_axis_3_is_counted_as_the_station_counts_it(name, horizontal):
+    known, chance = robot(name), np.random.default_rng(4)
+    lower, upper = known.lower.copy(), known.upper.copy()
+    counts = np.eye(6)
+    if horizontal:
+        counts[2] = known.couplings[0].row
+        lower[2], upper[2] = known.couplings[0].lower + 0.1, known.couplings[0].upper - 0.1
+
+    def flange(shown):
+        return known.forward(np.linalg.solve(counts, np.atleast_2d(shown).T).T)
+
+    shown = chance.uniform(lower, upper, (24, 6))
+    start = counts @ np.radians([0, 20, -10, 0, -60, 0])
+    T_start = flange(start)[0]
+    points = T_start[:3, 3] + np.c_[0 * np.arange(9), np.linspace(0, 0.1, 9), 0 * np.arange(9)]
+    found = answer({
+        "station": {"name": name, "lower": lower, "upper": upper, "q": shown, "T": flange(shown)},
+        "start": start.tolist(), "acceleration": 5.0, "gamma_step": np.radians(20), "x": None,
+        "T_flange_tip": np.eye(4), "points": points, "axes": np.tile(T_start[:3, 2], (9, 1)),
+        "name": "line", "speed": 0.05, "max_step": 0.02,
+    })  # fmt: skip
+    assert "error" not in found, found
+    q = np.array(found["q"])
+    np.testing.assert_allclose(q[0], start, atol=1e-12)
+    assert ((q >= lower - 1e-9) & (q <= upper + 1e-9)).all()
+    T = flange(q[found["waypoints"]])
+    np.testing.assert_allclose(T[:, :3, 3], found["points"], atol=1e-8)
+    np.testing.assert_allclose(T[:, :3, 2], found["axes"], atol=1e-8)
+    # The station's range of axis 3 bounds what it shows.
+    seen = station_robot(
+        {"name": name, "lower": lower, "upper": upper, "q": shown, "T": flange(shown)}, 5.0
+    )
+    np.testing.assert_array_equal(seen.counts, counts)
+    (bound,) = seen.robot.couplings
+    assert (bound.note == "range of axis 3 of the station") == horizontal
 
 
 def test_a_robot_that_bends_is_another_one():

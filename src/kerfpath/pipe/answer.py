@@ -20,7 +20,7 @@ from kerfpath.arrays import Array, Ints, as_pose, floats, integers, positive, sc
 from kerfpath.cell import Body, Cell, Hull, Mesh, Shape, allowed_pairs, cell_of, link_bodies
 from kerfpath.contour import Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.pipe.station import station_robot
+from kerfpath.pipe.station import StationRobot, station_robot
 from kerfpath.planner import plan
 from kerfpath.plans import Plan, TransferMove, node_rates
 from kerfpath.robots import Robot, chain_of
@@ -73,7 +73,7 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
     begun, path = time.perf_counter(), None
     try:
         path = _curve_of(request) if "station" in request else _path_of(request)
-        made, more = _planned(request, path)
+        made, seen = _planned(request, path)
     except InputError as error:
         return {"error": "input", "message": str(error)}
     except NoFeasiblePath as none:
@@ -86,14 +86,28 @@ def answer(request: Mapping[str, Any]) -> dict[str, Any]:
             return {"error": "reach", "message": said, "waypoint": at}
         return {"error": "path", "message": said}
     timed, first = _from_stop_to_stop(made)
+    moved = [each if seen is None else each @ seen.counts.T for each in timed[1:]]
     return {
         "joints": list(request.get("joints", made.robot.joint_names)),
-        **{name: values.tolist() for name, values in zip("qva", timed[1:], strict=True)},
+        **{name: values.tolist() for name, values in zip("qva", moved, strict=True)},
         "time": timed[0].tolist(),
         "waypoints": (path.waypoints + first).tolist(),
         "cost": made.cost,
         "seconds": time.perf_counter() - begun,
-        **more,
+        **({} if seen is None else _about(seen, path)),
+    }
+
+
+def _about(seen: StationRobot, path: _Path) -> dict[str, Any]:
+    """Return what an answer says about the robot of a station, and the nodes of its curve."""
+    return {
+        "robot": seen.robot.id,
+        "acceleration": seen.robot.acceleration_source,
+        "apart_mm": seen.apart_mm,
+        "apart_deg": seen.apart_deg,
+        "points": path.contour.points.tolist(),
+        "axes": path.contour.axes.tolist(),
+        "chord": path.chord,
     }
 
 
@@ -189,24 +203,17 @@ def _turned_evenly(axes: Array, at: Array) -> Array:
 # The plan, with the robot and the cell of the request.
 
 
-def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, dict[str, Any]]:
-    """Return the plan, and what an answer says about the robot of a station."""
+def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, StationRobot | None]:
+    """Return the plan, and the robot of the station if it is for one."""
     tool = as_pose(request["T_flange_tip"], "T_flange_tip")
-    around, cell, more = request.get("cell"), None, dict[str, Any]()
+    around, cell, seen, start = request.get("cell"), None, None, request["start"]
     if "station" in request:
         seen = station_robot(request["station"], request["acceleration"])
         robot = seen.robot
         T_base_world = as_pose(np.linalg.inv(seen.T_station_base), "T_station_base")
         tool = as_pose(seen.T_end_flange @ tool, "T_flange_tip")
-        more = {
-            "robot": robot.id,
-            "acceleration": robot.acceleration_source,
-            "apart_mm": seen.apart_mm,
-            "apart_deg": seen.apart_deg,
-            "points": path.contour.points.tolist(),
-            "axes": path.contour.axes.tolist(),
-            "chord": path.chord,
-        }
+        if start is not None:
+            start = np.linalg.solve(seen.counts, floats(start, "start", (robot.joints,)))
     else:
         T_world_base = as_pose(request["T_world_base"], "T_world_base")
         T_base_world = as_pose(np.linalg.inv(T_world_base), "T_world_base")
@@ -225,11 +232,11 @@ def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, dict[str, A
         if path.contour.x is None
         else (GammaWindow(start=0.0, end=end, low=0.0, high=0.0),),
         cell=cell,
-        start_q=request["start"],
+        start_q=start,
         end_q=request.get("end"),
         certify=None,
     )
-    return made, more
+    return made, seen
 
 
 def _robot(request: Mapping[str, Any], around: Mapping[str, Any] | None, folder: Path) -> Robot:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath.arrays import Array, floats, positive
 from kerfpath.errors import InputError
 from kerfpath.names import listed, nearest, squeezed
-from kerfpath.robots import Robot, robot, robot_ids
+from kerfpath.robots import Coupling, Robot, robot, robot_ids
 
 LARGEST_MM, LARGEST_DEG = 0.1, 0.01
 """Largest difference of two forward kinematics of the same robot: both round their lengths."""
@@ -23,19 +23,22 @@ MOST_CANDIDATES = 8
 class StationRobot(NamedTuple):
     """A robot of the library that moves as one of a station does.
 
-    At equal joints the flange of the station is at ``T_station_base @ robot.forward(q) @
-    T_end_flange`` in the robot base of the station, but for the differences.
+    Where the joints of the station are ``counts @ q``, its flange is at ``T_station_base @
+    robot.forward(q) @ T_end_flange`` in its robot base, but for the differences.
 
     Parameters
     ----------
     robot : Robot
         With the joint ranges of the station.
+    counts : (n, n)
+        The unit matrix, but for an axis 3 that is counted from the horizontal.
     T_station_base, T_end_flange : (4, 4) m
     apart_mm, apart_deg : float
         The largest differences at the joints that were compared.
     """
 
     robot: Robot
+    counts: Array
     T_station_base: Array
     T_end_flange: Array
     apart_mm: float
@@ -77,16 +80,14 @@ def station_robot(station: Mapping[str, Any], acceleration: Any) -> StationRobot
             f"robot {name!r}: expected the {found.joints} joints of {found.id}, got {q.shape[1]}; "
             "synchronized external axes are not supported"
         )
-    fitted = _fitted(found, q, T)
+    fitted = _nearest_fit(found, q, T)
     if not _agree(fitted):
         raise InputError(
             f"robot {name!r} moves otherwise than {found.id} of the library: at equal joints up to "
             f"{fitted.apart_mm:.3g} mm and {fitted.apart_deg:.2g} deg apart, at most "
             f"{LARGEST_MM:g} mm and {LARGEST_DEG:g} deg are accepted; {_alike(q, T)}"
         )
-    limited = found.with_limits(
-        lower=station["lower"], upper=station["upper"], endless=np.zeros(found.joints, bool)
-    )
+    limited = _limited(found, fitted.counts, station["lower"], station["upper"])
     return fitted._replace(robot=_accelerated(limited, acceleration))
 
 
@@ -98,6 +99,23 @@ def _named(name: str) -> Robot | None:
         if squeezed(name) in map(squeezed, spellings):
             return found
     return None
+
+
+def _limited(found: Robot, counts: Array, lower: Any, upper: Any) -> Robot:
+    """Return a robot with the joint ranges of a station; those that are coupled bound both."""
+    ends = [floats(each, "joint ranges", (found.joints,)).copy() for each in (lower, upper)]
+    couplings = list[Coupling]()
+    for i in np.flatnonzero((counts != np.eye(found.joints)).any(axis=1)):
+        note = f"range of axis {i + 1} of the station"
+        couplings.append(Coupling(row=counts[i], lower=ends[0][i], upper=ends[1][i], note=note))
+        for end, own, none in zip(ends, (found.lower, found.upper), (-np.inf, np.inf), strict=True):
+            end[i] = none if own is None else own[i]
+    return found.with_limits(
+        lower=ends[0],
+        upper=ends[1],
+        endless=np.zeros(found.joints, bool),
+        couplings=couplings or None,
+    )
 
 
 def _accelerated(found: Robot, given: Any) -> Robot:
@@ -121,7 +139,7 @@ def _alike(q: Array, T: Array) -> str:
     alike = [
         one
         for one in robot_ids()
-        if (known := robot(one)).joints == q.shape[1] and _agree(_fitted(known, q, T))
+        if (known := robot(one)).joints == q.shape[1] and _agree(_nearest_fit(known, q, T))
     ]
     if not alike:
         return "no robot of the library moves as it does"
@@ -132,7 +150,17 @@ def _agree(fitted: StationRobot) -> bool:
     return fitted.apart_mm <= LARGEST_MM and fitted.apart_deg <= LARGEST_DEG
 
 
-def _fitted(known: Robot, q: Array, T: Array) -> StationRobot:
+def _nearest_fit(known: Robot, q: Array, T: Array) -> StationRobot:
+    """Return the fit to poses T (m, 4, 4) at joints q (m, n) by either count of axis 3."""
+    counts = [np.eye(known.joints)]
+    if known.axis_3 == "horizontal":
+        shown = [one.row for one in known.couplings if one.row[1] and one.row[2] == 1.0]
+        counts += [np.vstack([counts[0][:2], row, counts[0][3:]]) for row in shown]
+    fits = [_fitted(known, each, q @ np.linalg.inv(each).T, T) for each in counts]
+    return min(fits, key=lambda fit: fit.apart_mm)
+
+
+def _fitted(known: Robot, counts: Array, q: Array, T: Array) -> StationRobot:
     """Return base and flange of a station for which T (m, 4, 4) is nearest at joints q (m, n).
 
     With X the base and Y the flange, T[i] = X @ forward(q[i]) @ Y. Rotations from pose 0 to pose i
@@ -157,6 +185,7 @@ def _fitted(known: Robot, q: Array, T: Array) -> StationRobot:
     off = Rotation.from_matrix(np.swapaxes(made[:, :3, :3], 1, 2) @ S).magnitude()
     return StationRobot(
         robot=known,
+        counts=counts,
         T_station_base=before,
         T_end_flange=behind,
         apart_mm=1e3 * float(np.linalg.norm(made[:, :3, 3] - T[:, :3, 3], axis=1).max()),
