@@ -47,6 +47,7 @@ NAMES = (
     "execution",
     "acceleration_table",
     "external",
+    "seven_axes",
     "torque",
     "certificate_audits",
     "studio",
@@ -110,6 +111,10 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
 
         modules = (kinematics, _families, _enclosures)
         return [module.run(quick=quick) for module in modules]
+    if name == "seven_axes":
+        from benchmarks import seven_axes
+
+        return seven_axes.run(quick=quick)
     if name == "compas":
         from benchmarks import compas
 

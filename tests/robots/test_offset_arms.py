@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benchmarks._seven_axis_arms import panda, panda_chain
 from scipy.spatial.transform import Rotation
 from tests.urdf.test_urdf import joint, urdf
 
@@ -9,7 +10,6 @@ from conftest import pose
 from kerfpath import Contour, InputError, Robot, audit, plan
 from kerfpath.refiner import refine
 from kerfpath.robots import Arm
-from kerfpath.robots.limits import RobotLimits
 from kerfpath.robots.recognition import recognise
 from kerfpath.urdf import KinematicChain
 
@@ -28,21 +28,6 @@ def arm_of(family, rng):
     origins[:, :3, 3] = np.diff(place, axis=0, prepend=0.0)
     end = pose(rng.uniform(-0.3, 0.3, 3), Rotation.random(rng=rng).as_matrix())
     return recognise(KinematicChain(origins=origins, axes=along, end=end))[0]
-
-
-def franka():
-    """The Panda: lengths and angles of Franka's documents (Craig's convention), m."""
-    a = [0, 0, 0, 0.0825, -0.0825, 0, 0.088]
-    d = [0.333, 0, 0.316, 0, 0.384, 0, 0]
-    quarters = [0, -1, 1, 1, -1, 1, 1]
-    origins = [
-        pose([a[i], 0, 0], Rotation.from_rotvec([np.pi / 2 * quarters[i], 0, 0]).as_matrix())
-        @ pose([0, 0, d[i]])
-        for i in range(7)
-    ]
-    return KinematicChain(
-        origins=np.array(origins), axes=np.tile([0.0, 0, 1], (7, 1)), end=pose([0, 0, 0.107])
-    )
 
 
 def off(a, b):
@@ -91,7 +76,7 @@ def test_a_posture_is_followed_until_two_solutions_are_one(family):
 
 @pytest.mark.parametrize("angles", [[0] * 7, [0, 0, 0, -90, 0, 90, 0], [20, 0, 40, -60, 0, 0, 10]])
 def test_at_singularities_the_pose_is_reached(angles):
-    arm, _ = recognise(franka())
+    arm, _ = recognise(panda_chain())
     q = np.radians(np.array(angles, dtype=float))
     for small in (0.0, 1e-15, 1e-11, 1e-8, 1e-5):
         near = q + small * np.array([0, 1, -1, 1, 1, -1, 1])
@@ -103,7 +88,7 @@ def test_at_singularities_the_pose_is_reached(angles):
 
 
 def test_a_panda_stands_where_franka_says():
-    arm, notes = recognise(franka())
+    arm, notes = recognise(panda_chain())
     assert (arm.kinematics, notes) == ("offset_wrist", ())
     # Upright: 333 + 316 + 384 mm high, down again by 107, and 88 ahead.
     np.testing.assert_allclose(arm.forward(np.zeros(7))[:3, 3], [0.088, 0, 0.926], atol=1e-15)
@@ -113,7 +98,7 @@ def test_a_panda_stands_where_franka_says():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_it_is_read_from_a_description_in_whatever_joint_frames(tmp_path, seed):
-    chain, rng = franka(), np.random.default_rng(seed)
+    chain, rng = panda_chain(), np.random.default_rng(seed)
     origins, axes, end = chain.origins.copy(), chain.axes.copy(), chain.end
     for i in range(7):
         G = pose(axes[i] * rng.uniform(-1, 1), Rotation.random(rng=rng).as_matrix())
@@ -139,7 +124,7 @@ def test_it_is_read_from_a_description_in_whatever_joint_frames(tmp_path, seed):
 
 
 def test_axes_that_do_not_meet_are_refused_with_their_names():
-    chain = franka()
+    chain = panda_chain()
     for moved, said in (
         (1, r"axes 1, 2 and 3 miss a common point by 40 mm"),
         (5, r"axes 5 and 6 miss a common point by 40 mm"),
@@ -150,20 +135,6 @@ def test_axes_that_do_not_meet_are_refused_with_their_names():
             recognise(KinematicChain(origins=origins, axes=chain.axes, end=chain.end))
     with pytest.raises(InputError, match="needs the chain of its seven joints"):
         Arm(kinematics="offset_wrist", geometry={}).forward(np.zeros(7))
-
-
-def panda():
-    """With the limits that Franka publishes."""
-    return Robot(
-        id="panda",
-        arm=recognise(franka())[0],
-        limits=RobotLimits(
-            lower=np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973]),
-            upper=np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973]),
-            velocity=np.array([2.175] * 4 + [2.61] * 3),
-            acceleration=np.array([15, 7.5, 10, 12.5, 15, 20, 20.0]),
-        ),
-    )
 
 
 @pytest.mark.slow
