@@ -44,10 +44,11 @@ figures: .venv/run.stamp
 	$(BIN)/python examples/known_against_proposed.py
 	$(BIN)/python examples/techniques.py
 
-# The pages that the documentation shows, photographed in Chromium, and the output of the lessons.
+# The pages that the documentation shows, photographed in Chromium, the output of the lessons, and FreeCAD.
 screenshots: .venv/dev.stamp
 	$(BIN)/python examples/screenshots.py
 	$(BIN)/python docs/_ext/lessons.py pictures
+	PICTURES=docs FREECAD=required $(BIN)/pytest -q tests/freecad/test_workbench.py
 
 # One environment, filled in steps: what running needs, what developing adds, what benchmarks and the site add.
 .venv/tools.stamp: requirements/build.txt

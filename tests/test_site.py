@@ -222,7 +222,7 @@ def test_the_page_of_a_package_describes_each_name_once(package):
 def test_every_package_that_is_an_interface_has_a_page():
     packages = {path.parent.name for path in (ROOT / "src/kerfpath").glob("[a-z]*/__init__.py")}
     # Those of other programs have pages of their own, and need their packages.
-    others = {"cli", "compas", "kernels", "robodk", "studio"}
+    others = {"cli", "compas", "freecad", "kernels", "robodk", "studio"}
     assert {f"kerfpath.{name}" for name in packages - others} <= set(PACKAGES)
 
 

@@ -277,3 +277,32 @@ def script(
     from kerfpath.cli.program_output import write_script
 
     write_script(job, output)
+
+
+@app.command()
+def freecad(
+    to: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MOD",
+            help="Folder of add-ons; default: that of every FreeCAD of this user.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Install the workbench for FreeCAD, 0.20 or newer, which then plans with this kerfpath.
+
+    Start FreeCAD again afterwards, and choose the workbench Kerfpath.
+
+    Example: kerfpath freecad
+    """
+    from rich.markup import escape
+
+    from kerfpath.cli.show import out, print_json
+    from kerfpath.freecad import install
+
+    folders = install(to)
+    print_json({"installed": [str(folder) for folder in folders]})
+    for folder in folders:
+        out.print(f"installed {escape(str(folder))}", soft_wrap=True)
+    out.print("Start FreeCAD again, and choose the workbench Kerfpath.")

@@ -242,6 +242,14 @@ def studio(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the browser.")
     ] = True,
+    as_json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            help="Print job, address and version as one JSON object, and stop once standard input "
+            "ends: for programs that start the studio, such as FreeCAD.",
+        ),
+    ] = False,
 ) -> None:
     """See a job in the browser, change it, watch it cut, and export it.
 
@@ -254,4 +262,4 @@ def studio(
     """
     from kerfpath.cli.studio import open_studio
 
-    open_studio(job, host=host, port=port, browser=browser)
+    open_studio(job, host=host, port=port, browser=browser, for_program=as_json)

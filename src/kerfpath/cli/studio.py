@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import signal
+import sys
 from importlib.resources import as_file, files
 from pathlib import Path
+from threading import Thread
 
 from rich.markup import escape
 
+from kerfpath import __version__
 from kerfpath.cad import SUFFIXES
 from kerfpath.cli.first_job import first_job
 from kerfpath.cli.show import out
@@ -18,11 +23,14 @@ SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part; the studio copies them, so that they can be changed."""
 
 
-def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:
+def open_studio(
+    job: Path | None, *, host: str, port: int, browser: bool, for_program: bool = False
+) -> None:
     """Serve a job to the browser until the command is stopped.
 
     Without a job, a copy of the demo job is served. For a drawing, the job beside it with the same
-    name is served, and written if there is none.
+    name is served, and written if there is none. A program that has started the studio gets a line
+    of JSON, and the studio ends with it: once standard input ends.
 
     Raises
     ------
@@ -39,9 +47,20 @@ def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> Non
     from kerfpath.studio import serve
 
     def show(address: str) -> None:
+        if for_program:
+            said = {"job": str(path), "address": address, "version": __version__}
+            print(json.dumps(said), flush=True)
+            Thread(target=_end_with_input, daemon=True).start()
+            return
         out.print(f"{escape(str(path))} at [bold]{escape(address)}[/] (stop with Ctrl-C)")
 
     serve(path, host=host, port=port, browser=browser, show=show)
+
+
+def _end_with_input() -> None:
+    """Stop this process, as SIGTERM does, once standard input ends."""
+    sys.stdin.read()
+    signal.raise_signal(signal.SIGTERM)
 
 
 def _copy_of_demo() -> Path:

@@ -41,6 +41,7 @@ from kerfpath.job.format import doubts_of as doubts_of
 from kerfpath.job.format import find_chart as find_chart
 from kerfpath.job.format import heads as heads
 from kerfpath.job.format import machine_of as machine_of
+from kerfpath.job.format import only_loops as only_loops
 from kerfpath.job.format import origins_of as origins_of
 from kerfpath.job.format import places_of as places_of
 from kerfpath.job.format import pose as pose

@@ -443,6 +443,7 @@ def part_message(job: Job, part: Part, revision: int) -> PartMessage:
     kept = {loop.name for loop in told}
     return PartMessage(
         revision=revision,
+        T=flat(job.placement, 15),
         loops=[_entry(loop, job) for loop in asked if loop.name in kept],
         faces=[FaceEntry(name=name, triangles=count) for name, count in part.mesh_faces()],
         left_out=len(part.loops) - len(told),

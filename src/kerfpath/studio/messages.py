@@ -319,6 +319,8 @@ class PartMessage(Message):
 
     type: Literal["part"] = "part"
     revision: int
+    T: Numbers
+    """Pose of the part in the base, in which the loops are given."""
     loops: list[LoopEntry]
     faces: list[FaceEntry]
     """In the order of the mesh."""
@@ -1090,6 +1092,9 @@ class CutLoops(Strict):
     type: Literal["cut"]
     loops: Annotated[tuple[Words, ...], Field(min_length=1, max_length=MOST_LOOPS, strict=False)]
     """Their names."""
+    alone: bool = False
+    """Whether the job then cuts these loops alone: those that it cuts already stay, all others
+    go."""
 
 
 class RemoveContour(Strict):

@@ -24,6 +24,7 @@ from kerfpath.job import (
     JobResult,
     PreparedJob,
     job_text,
+    only_loops,
     program_texts,
     python_script,
     read_job,
@@ -498,8 +499,8 @@ class Session:
             case Relax():
                 self._relax(ask)
             case CutLoops():
-                part = self._planning.known_part()
-                self._replace(with_loops(await self._job_now(), part, ask.loops))
+                part, change = self._planning.known_part(), only_loops if ask.alone else with_loops
+                self._replace(change(await self._job_now(), part, ask.loops))
             case RemoveContour():
                 self._replace(without_contour(await self._job_now(), ask.index))
             case Keep() | Rename() | KeptCommand():

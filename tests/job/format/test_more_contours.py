@@ -7,7 +7,7 @@ import pytest
 
 from jobs import DEMO, SLIT_JOB, WHOLE, write_slit_jobs
 from kerfpath.errors import InputError
-from kerfpath.job import read_job, with_loops, without_contour
+from kerfpath.job import only_loops, read_job, with_loops, without_contour
 
 SLITS_JOB = SLIT_JOB.replace('[[contour]]\npick = "b"\nspeed_m_min = 2\ncount = 11\n', "")
 """One of the two slits is cut."""
@@ -136,3 +136,27 @@ def test_contours_in_one_line_are_left_to_their_writer(tmp_path):
     job = read_job(tmp_path / "slits.toml")
     with pytest.raises(InputError, match=r"\[\[contour\]\]"):
         with_loops(job, job.read_part(), ["b"])
+
+
+def test_only_some_loops_are_cut_where_others_were(demo):
+    job, part = demo
+    text = only_loops(job, part, ["skin/hole2", "skin/outer", "skin/hole1"])
+    assert [(t["pick"], t["speed_m_min"]) for t in tables(text)] == [
+        ("skin/hole1", 3),
+        ("skin/hole2", 3),
+        ("skin/outer", 9),
+    ]
+    before = {**tomllib.loads(job.text), "contour": None}
+    assert {**tomllib.loads(text), "contour": None} == before
+    assert only_loops(job, part, [t["pick"] for t in tables(job.text)]) == job.text
+
+
+def test_one_table_of_loops_that_stay_and_go_is_refused(demo, tmp_path):
+    job, part = demo
+    head, _, rest = job.text.partition("[[contour]]")
+    holes = '[[contour]]\nspeed_m_min = 3\nspacing_mm = 1\n[contour.pick_all]\nkind = "inner"\n\n'
+    text = head + holes + rest[rest.index("[plan]") :]
+    with pytest.raises(InputError, match=r"one table picks .*, too, beside 'skin/hole16'"):
+        only_loops(job_of(tmp_path, text), part, ["skin/hole16"])
+    with pytest.raises(InputError, match="expected loops to cut"):
+        only_loops(job_of(tmp_path, text), part, [])

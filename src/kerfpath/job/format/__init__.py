@@ -13,6 +13,7 @@ from kerfpath.job.format.contour import ContourSpec as ContourSpec
 from kerfpath.job.format.drawing import Drawing as Drawing
 from kerfpath.job.format.faults import all_of as all_of
 from kerfpath.job.format.faults import refusal_at as refusal_at
+from kerfpath.job.format.more_contours import only_loops as only_loops
 from kerfpath.job.format.more_contours import with_loops as with_loops
 from kerfpath.job.format.more_contours import without_contour as without_contour
 from kerfpath.job.format.prepared import Candidate as Candidate

@@ -61,6 +61,45 @@ def with_loops(job: Job, part: Part, names: Sequence[str]) -> str:
     return _required(text, source, tables)
 
 
+def only_loops(job: Job, part: Part, names: Sequence[str]) -> str:
+    """Return the text of a job that cuts these loops of its part alone.
+
+    Contours of other loops are removed; loops that are not cut yet are added as `with_loops` does.
+
+    Parameters
+    ----------
+    job : Job
+    part : Part
+        The part in the job's drawing.
+    names : sequence of str
+        Names of all loops to cut.
+
+    Raises
+    ------
+    InputError
+        As for `with_loops`; or no loop is named, or one table cuts loops of both kinds.
+    """
+    if not names:
+        raise InputError("job: expected loops to cut, got none; name at least one")
+    wanted = set(names)
+    cut = [{task.pick for task in spec.expanded(part)} for spec in job.contours]
+    for picks in cut:
+        if picks & wanted and not picks <= wanted:
+            raise InputError(
+                f"job: one table picks {min(picks - wanted)!r}, too, beside "
+                f"{min(picks & wanted)!r}; pick each loop by a table of its own"
+            )
+    source = tomllib.loads(job.text)
+    gone = [each for each, picks in zip(source["contour"], cut, strict=True) if not picks & wanted]
+    text = with_loops(job, part, [name for name in names if not any(name in p for p in cut)])
+    tables: list[Mapping[str, object]] = list(tomllib.loads(text)["contour"])
+    for index in reversed(range(len(tables))):
+        if tables[index] in gone:
+            text = _without(text, index, len(tables))
+            del tables[index]
+    return _required(text, source, tables)
+
+
 def without_contour(job: Job, index: int) -> str:
     """Return the text of a job without one of its [[contour]] tables; its comments stay.
 
@@ -76,16 +115,22 @@ def without_contour(job: Job, index: int) -> str:
         raise InputError(f"job: expected a contour from 0 to {len(tables) - 1}, got {index}")
     if len(tables) == 1:
         raise InputError("job: the only contour cannot be removed; add another one first")
-    lines = _lines(job.text)
-    begin, end = _blocks(lines, len(tables))[index]
+    text = _without(job.text, index, len(tables))
+    del tables[index]
+    return _required(text, source, tables)
+
+
+def _without(text: str, index: int, count: int) -> str:
+    """Return a text without one of its [[contour]] tables, of which it has `count`."""
+    lines = _lines(text)
+    begin, end = _blocks(lines, count)[index]
     after = end
     while after < len(lines) and not lines[after].strip():
         after += 1
     if after == end and begin and not lines[begin - 1].strip():
         begin -= 1
     del lines[begin:after]
-    del tables[index]
-    return _required("".join(lines), source, tables)
+    return "".join(lines)
 
 
 def _lines(text: str) -> list[str]:

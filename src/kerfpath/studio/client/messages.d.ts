@@ -257,6 +257,8 @@ export interface FaceEntry {
 export interface PartMessage {
   type: "part";
   revision: number;
+  /** Pose of the part in the base, in which the loops are given. */
+  T: number[];
   loops: LoopEntry[];
   /** In the order of the mesh. */
   faces: FaceEntry[];
@@ -881,6 +883,8 @@ export interface CutLoops {
   type: "cut";
   /** Their names. */
   loops: string[];
+  /** Whether the job then cuts these loops alone: those that it cuts already stay, all others go. */
+  alone?: boolean;
 }
 
 /** Removes this table of `contour` from the job. */

@@ -1,0 +1,274 @@
+"""The commands of the workbench."""
+
+import os
+import threading
+
+import FreeCAD as App
+import FreeCADGui as Gui
+from PySide import QtCore, QtGui
+
+try:
+    from PySide import QtWidgets
+except ImportError:  # FreeCAD 0.20 and 0.21 have them all in QtGui
+    QtWidgets = QtGui
+
+from . import VERSION, geometry, icon, objects, panel, process, session
+from .panel import tr
+
+TOOLBAR = [
+    "Kerfpath_Cut",
+    "Kerfpath_Remove",
+    "Kerfpath_Fixture",
+    "Kerfpath_Plan",
+    "Kerfpath_Program",
+]
+"""The commands, in the order of toolbar and menu."""
+WITH_STUDIO = "kerfpath[studio]=={}".format(VERSION)
+"""What the workbench installs, unless its preference `Requirement` says something else."""
+
+boxes = []
+"""Open messages; they wait for nobody."""
+
+
+def tell(text, install=False):
+    """Show a message, which may offer to install kerfpath; it does not wait for an answer."""
+    App.Console.PrintWarning("kerfpath: {}\n".format(text))
+    box = QtWidgets.QMessageBox(Gui.getMainWindow())
+    box.setWindowTitle(tr("Kerfpath"))
+    box.setText(text)
+    box.setModal(False)
+    box.setAttribute(QtCore.Qt.WA_DeleteOnClose)
+    box.addButton(QtWidgets.QMessageBox.Close)
+    if install:
+        button = box.addButton(tr("Install kerfpath"), QtWidgets.QMessageBox.AcceptRole)
+        button.clicked.connect(install_kerfpath)
+    boxes[:] = [box]
+    box.show()
+
+
+# -----------------------------------------------------------------------------
+# Install kerfpath.
+
+
+class _Installation(QtCore.QObject):
+    """The installation of kerfpath in a thread."""
+
+    done = QtCore.Signal(str)
+
+    def __init__(self):
+        super().__init__()
+        self.done.connect(lambda said: tell(said or tr("kerfpath is installed; go on")))
+        threading.Thread(target=self._work, daemon=True).start()
+
+    def _work(self):
+        wanted = App.ParamGet(session.PREFERENCES).GetString("Requirement", WITH_STUDIO)
+        try:
+            process.install(session.own_environment(), wanted)
+            self.done.emit("")
+        except process.ProcessError as error:
+            self.done.emit(str(error))
+
+
+def install_kerfpath():
+    """Install kerfpath in an environment of the workbench, which takes some minutes."""
+    global installation
+    tell(tr("Installing kerfpath; this takes some minutes. A message says when it is done."))
+    installation = _Installation()
+
+
+installation = None
+
+
+# -----------------------------------------------------------------------------
+# What is picked.
+
+
+def picked():
+    """Return the object whose edges or faces are selected, and the edges by what is picked.
+
+    Raises
+    ------
+    PickError
+        Nothing of the kind is selected, or parts of several objects are.
+    """
+    found, groups = [], {}
+    for each in Gui.Selection.getSelectionEx():
+        if isinstance(getattr(each.Object, "Proxy", None), objects.Contour):
+            continue
+        names = [name.rsplit(".", 1)[-1] for name in each.SubElementNames]
+        names = [name for name in names if name.startswith(("Edge", "Face"))]
+        if not names:
+            continue
+        found.append(each.Object)
+        edges, shape = objects.edges_of(each.Object), each.Object.Shape.copy()
+        shape.Placement = App.Placement()
+        for name in names:
+            number = int(name[4:]) - 1
+            if name.startswith("Edge"):
+                groups[name] = [edges[number]]
+            else:
+                for i, wire in enumerate(shape.Faces[number].Wires):
+                    groups["{} of {}".format("wire {}".format(i + 1), name)] = wire.Edges
+    if not found:
+        raise geometry.PickError(
+            tr("nothing to cut is picked: pick edges or faces of the part first")
+        )
+    if len(found) > 1:
+        labels = " and ".join(each.Label for each in found)
+        raise geometry.PickError(tr("edges of one part are cut at a time, got those of ") + labels)
+    return found[0], groups
+
+
+def contours_picked():
+    """Return the contours that are selected."""
+    return [
+        each for each in Gui.Selection.getSelection()
+        if isinstance(getattr(each, "Proxy", None), objects.Contour)
+    ]  # fmt: skip
+
+
+def open_panel(job):
+    """Start the process of a job, and show its panel; return the session, or None."""
+    return _at_work(job.Document, job.Part)
+
+
+def remove_contours(contours):
+    """Take contours out of the job."""
+    at_work = _at_work(contours[0].Document, None)
+    if at_work is not None:
+        at_work.remove(contours)
+
+
+def _at_work(document, part):
+    try:
+        found = session.session_of(document, part)
+    except process.ProcessError as error:
+        tell(str(error), install="not found" in str(error))
+        return None
+    panel.show(found)
+    return found
+
+
+# -----------------------------------------------------------------------------
+# The commands.
+
+
+class _Command:
+    """A command; `NAME` is that of its icon."""
+
+    NAME = MENU = TIP = KEYS = ""
+
+    def GetResources(self):
+        return {
+            "Pixmap": icon(self.NAME),
+            "MenuText": tr(self.MENU),
+            "ToolTip": tr(self.TIP),
+            "Accel": self.KEYS,
+        }
+
+    def IsActive(self):
+        return App.ActiveDocument is not None
+
+    def Activated(self):
+        try:
+            self.run()
+        except (geometry.PickError, process.ProcessError) as error:
+            tell(str(error))
+
+
+class Cut(_Command):
+    """Contours of what is picked."""
+
+    NAME, MENU, KEYS = "contour", "Cut what is picked", "K, C"
+    TIP = "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
+
+    def run(self):
+        part, groups = picked()
+        job = session.job_of(part.Document)
+        if job is not None and job.Part != part:
+            raise geometry.PickError(
+                tr("the job of this document cuts {}, picked is {}; pick an edge of the first, or "
+                   "delete the job").format(job.Part.Label, part.Label)
+            )  # fmt: skip
+        Gui.Selection.clearSelection()
+        found = _at_work(part.Document, part)
+        if found is not None:
+            found.problem = ""
+            found.cut(groups)
+
+
+class Remove(_Command):
+    """Contours taken out of the job."""
+
+    NAME, MENU, KEYS = "remove", "Do not cut", "K, R"
+    TIP = "Take the selected contours out of the job"
+
+    def IsActive(self):
+        return bool(App.ActiveDocument and contours_picked())
+
+    def run(self):
+        remove_contours(contours_picked())
+
+
+class Fixture(_Command):
+    """What the robot keeps clear of."""
+
+    NAME, MENU, KEYS = "fixture", "Keep clear of it", "K, F"
+    TIP = "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions"
+
+    def IsActive(self):
+        return bool(App.ActiveDocument and session.job_of(App.ActiveDocument))
+
+    def run(self):
+        job = session.job_of(App.ActiveDocument)
+        chosen = [
+            each for each in Gui.Selection.getSelection()
+            if hasattr(each, "Shape") and each.Shape.Solids and each != job.Part
+        ]  # fmt: skip
+        if not chosen:
+            raise geometry.PickError(tr("select solids other than the part first"))
+        left = [each for each in job.Fixtures if each not in chosen]
+        new = [each for each in chosen if each not in job.Fixtures]
+        job.Document.openTransaction("Kerfpath: Fixtures")
+        job.Fixtures = left + new
+        job.Document.commitTransaction()
+        _at_work(job.Document, job.Part)
+
+
+class Plan(_Command):
+    """The panel of the job."""
+
+    NAME, MENU, KEYS = "kerfpath", "Plan and play", "K, P"
+    TIP = "Show the panel of the job: plan, play, settings, program"
+
+    def IsActive(self):
+        return bool(App.ActiveDocument and session.job_of(App.ActiveDocument))
+
+    def run(self):
+        open_panel(session.job_of(App.ActiveDocument))
+
+
+class Program(_Command):
+    """The program, written."""
+
+    NAME, MENU, KEYS = "program", "Write the program", "K, W"
+    TIP = "Write the audited program, the job and the drawing"
+
+    def IsActive(self):
+        found = session.running(App.ActiveDocument) if App.ActiveDocument else None
+        return bool(found and found.outcome)
+
+    def run(self):
+        session.running(App.ActiveDocument).export()
+
+
+def add_commands():
+    """Add the commands to FreeCAD."""
+    for command in (Cut, Remove, Fixture, Plan, Program):
+        Gui.addCommand("Kerfpath_" + command.__name__, command())
+
+
+def add_languages():
+    """Tell FreeCAD where the translations are."""
+    Gui.addLanguagePath(os.path.join(os.path.dirname(icon("")), "..", "translations"))
+    Gui.updateLocale()
