@@ -25,6 +25,8 @@ SAMPLES = 8
 
 LEADS = [KINDS.index(kind) for kind in ("pierce", "lead-in", "lead-out")]
 """Kinds of stretches in the waste."""
+GIVE = 0.03
+"""To which share of themselves shares of a speed are found."""
 SLOWEST = 0.1
 """Smallest share of the speed at which a tolerance is looked for."""
 
@@ -255,8 +257,8 @@ def share_within(
 ) -> float | None:
     """Return the largest share of its speed at which a run stays within a tolerance, m.
 
-    It is found by halving, to 3 %, with the zones of the program and the same way of the joints;
-    None if the corners alone are too wide, or if `SLOWEST` of the speed is too fast.
+    It is found to 3 %, with the zones of the program and the same way of the joints; None if the
+    corners alone are too wide, or if `SLOWEST` of the speed is too fast.
     """
     drawn, alone = _Drawn.of(path, len(run.tool_motion.T)), replace(response, sigma_range=None)
 
@@ -269,9 +271,18 @@ def share_within(
         return 1.0
     if corners >= tolerance:
         return None
-    # The lag moves the tip about as the square of the speed.
-    first = float(np.sqrt((tolerance - corners) / (full - corners)))
-    return largest_share(lambda share: largest(share, alone) <= tolerance, first)
+
+    def holds(share: float) -> bool:
+        return largest(share, alone) <= tolerance
+
+    # The lag moves the tip about as the square of the speed, so the share is known nearly.
+    low = (1 - GIVE / 2) * float(np.sqrt((tolerance - corners) / (full - corners)))
+    if low <= SLOWEST:
+        return largest_share(holds, low)
+    if not holds(low):
+        return largest_share(holds, (1 - GIVE) * low, low)
+    high = low / (1 - GIVE)
+    return largest_share(holds, high) if high < 1 and holds(high) else low
 
 
 def _tips(run: Executed, q: Array) -> Array:
@@ -284,15 +295,15 @@ def largest_share(
 ) -> float | None:
     """Return the largest share of a speed, to 3 %, at which something holds.
 
-    It is looked for from `first` down, and then up to `too_fast`; None if it does not hold at
-    `SLOWEST` of the speed.
+    It is looked for from `first` down, and then up to `too_fast` by halving; None if it does not
+    hold at `SLOWEST` of the speed.
     """
     low = first
     while not holds(low := max(low, SLOWEST)):
         if low == SLOWEST:
             return None
         too_fast, low = low, 0.8 * low
-    while too_fast - low > 0.03 * too_fast:
+    while too_fast - low > GIVE * too_fast * (1 + 1e-9):
         middle = float(np.sqrt(low * too_fast))
         low, too_fast = (middle, too_fast) if holds(middle) else (low, middle)
     return low
