@@ -35,8 +35,9 @@ class ConicSolution(NamedTuple):
 
 
 def minimise(
-    cost: Array, rows: SparseRows, bounds: Array, cones: Sequence[Any], *, threads: int = 0
-) -> ConicSolution:
+    cost: Array, rows: SparseRows, bounds: Array, cones: Sequence[Any], *, threads: int = 0,
+    scales: bool = True,
+) -> ConicSolution:  # fmt: skip
     """Minimise cost x, so that bounds - rows x lies in the cones.
 
     Parameters
@@ -48,6 +49,8 @@ def minimise(
         Cones of Clarabel, whose sizes add up to m.
     threads : int
         Threads of the solver, 0: as many as it likes.
+    scales : bool
+        Whether the solver scales rows and unknowns first.
 
     Raises
     ------
@@ -59,6 +62,7 @@ def minimise(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = threads
+    settings.equilibrate_enable = scales
     none = sparse.csc_matrix((len(cost), len(cost)))
     found = clarabel.DefaultSolver(none, cost, rows, bounds, list(cones), settings).solve()
     return ConicSolution(np.array(found.x), np.array(found.z), found.status in SOLVED)

@@ -84,8 +84,11 @@ class ConstraintRows:
         """Add cones: of each `size` rows of slope x + value, the first is >= the others' norm."""
         self._cones.append((slope, value, size))
 
-    def solve(self, cost: Array, equal: Rows | None) -> Array | None:
-        """Minimise cost x subject to equal x = 0; None if the solver finds no optimum."""
+    def solve(self, cost: Array, equal: Rows | None, *, scaled: bool = False) -> Array | None:
+        """Minimise cost x subject to equal x = 0; None if the solver finds no optimum.
+
+        The rows of a program that is `scaled` already are scaled again only if it is not solved so.
+        """
         zero = [] if equal is None else [(equal, np.zeros(len(equal.value)))]
         blocks = [*zero, *self._flat, *((-slope, value) for slope, value, _ in self._cones)]
         kinds: list[Any] = [ZeroConeT(len(b)) for _, b in zero]
@@ -99,10 +102,10 @@ class ConstraintRows:
         column = np.concatenate([a.column.ravel() for a, _ in blocks])
         some = value != 0
         shape = len(bounds), self.variables
-        found = minimise(
-            np.pad(cost, (0, self.variables - len(cost))),
-            sparse.csc_matrix((value[some], (row[some], column[some])), shape=shape),
-            bounds,
-            kinds,
-        )
-        return found.x if found.solved else None
+        matrix = sparse.csc_matrix((value[some], (row[some], column[some])), shape=shape)
+        padded = np.pad(cost, (0, self.variables - len(cost)))
+        for scales in (False, True) if scaled else (True,):
+            found = minimise(padded, matrix, bounds, kinds, scales=scales)
+            if found.solved:
+                return found.x
+        return None
