@@ -30,9 +30,7 @@ def picture(name):
         dock.hide()
     for _ in range(5):
         Gui.updateGui()
-    screen = QtGui.QApplication.primaryScreen().grabWindow(0)
-    small = screen.scaledToWidth(1200, QtCore.Qt.SmoothTransformation).toImage()
-    small.convertToFormat(QtGui.QImage.Format_Indexed8).save(os.path.join(OUT, name + ".png"))
+    QtGui.QApplication.primaryScreen().grabWindow(0).save(os.path.join(OUT, name + ".png"))
 
 
 def until(fits, what):

@@ -79,6 +79,17 @@ def test_a_loop_becomes_a_contour_that_is_planned_in_one_step(tmp_path):
         assert text == QUICK
 
 
+def test_these_loops_alone_are_cut_in_one_step(tmp_path):
+    with serving(write_job(tmp_path)) as client, talking(client) as page:
+        page.until("part")
+        page.say("cut", loops=["skin/hole3", "skin/hole11"], alone=True)
+        text = page.until("job", revision=2)["text"]
+        picks = {table["pick"] for table in tomllib.loads(text)["contour"]}
+        assert picks == {"skin/hole3", "skin/hole11"}
+        page.say("undo")
+        assert page.until("job", revision=3)["text"] == QUICK
+
+
 def test_of_a_job_with_a_fault_loops_can_still_be_seen_and_nothing_is_added(tmp_path):
     text = QUICK.replace('pick = "skin/hole11"', 'pick = "skin/hole999"')
     assert text != QUICK

@@ -151,12 +151,14 @@ def test_only_some_loops_are_cut_where_others_were(demo):
     assert only_loops(job, part, [t["pick"] for t in tables(job.text)]) == job.text
 
 
-def test_one_table_of_loops_that_stay_and_go_is_refused(demo, tmp_path):
+def test_a_loop_of_a_table_of_many_gets_a_table_of_its_own(demo, tmp_path):
     job, part = demo
     head, _, rest = job.text.partition("[[contour]]")
     holes = '[[contour]]\nspeed_m_min = 3\nspacing_mm = 1\n[contour.pick_all]\nkind = "inner"\n\n'
-    text = head + holes + rest[rest.index("[plan]") :]
-    with pytest.raises(InputError, match=r"one table picks .*, too, beside 'skin/hole16'"):
-        only_loops(job_of(tmp_path, text), part, ["skin/hole16"])
+    many = job_of(tmp_path, head + holes + rest[rest.index("[plan]") :])
+    text = only_loops(many, part, ["skin/hole16"])
+    (table,) = tables(text)
+    assert table["pick"] == "skin/hole16"
+    assert table["speed_m_min"] == 3
     with pytest.raises(InputError, match="expected loops to cut"):
-        only_loops(job_of(tmp_path, text), part, [])
+        only_loops(many, part, [])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,14 +45,26 @@ def with_loops(job: Job, part: Part, names: Sequence[str]) -> str:
         A loop does not exist, has a gap, or is cut already; or the contours of the job are not
         written as [[contour]] tables.
     """
-    cut = [{task.pick for task in spec.expanded(part)} for spec in job.contours]
+    cut = _picks(job, part)
+    return _with_loops(job, part, names, cut, set().union(*cut))
+
+
+def _picks(job: Job, part: Part) -> list[set[str]]:
+    """Return the loops of each table."""
+    return [{task.pick for task in spec.expanded(part)} for spec in job.contours]
+
+
+def _with_loops(
+    job: Job, part: Part, names: Sequence[str], cut: Sequence[set[str]], barred: Collection[str]
+) -> str:
+    """Return the text with these loops, none of them barred; `cut` has those of each table."""
     text, source = job.text, tomllib.loads(job.text)
     tables: list[Mapping[str, object]] = list(source["contour"])
     outer = [i for i, picks in enumerate(cut) if any(_is_trim(part.loop(n)) for n in picks)]
     first_trim = outer[0] if outer else len(tables)
     for name in dict.fromkeys(names):
         loop = part.loop(name)
-        _require_to_cut(loop, job, any(name in picks for picks in cut))
+        _require_to_cut(loop, job, name in barred)
         at = first_trim if loop.kind == "inner" else len(tables)
         table = _like(job, source, part, loop)
         text = _inserted(text, at, _written(table))
@@ -64,7 +76,8 @@ def with_loops(job: Job, part: Part, names: Sequence[str]) -> str:
 def only_loops(job: Job, part: Part, names: Sequence[str]) -> str:
     """Return the text of a job that cuts these loops of its part alone.
 
-    Contours of other loops are removed; loops that are not cut yet are added as `with_loops` does.
+    Contours of other loops are removed; loops that are not cut yet are added as `with_loops` does,
+    also those of a table that picks others, too.
 
     Parameters
     ----------
@@ -77,21 +90,16 @@ def only_loops(job: Job, part: Part, names: Sequence[str]) -> str:
     Raises
     ------
     InputError
-        As for `with_loops`; or no loop is named, or one table cuts loops of both kinds.
+        As for `with_loops`; or no loop is named.
     """
     if not names:
         raise InputError("job: expected loops to cut, got none; name at least one")
-    wanted = set(names)
-    cut = [{task.pick for task in spec.expanded(part)} for spec in job.contours]
-    for picks in cut:
-        if picks & wanted and not picks <= wanted:
-            raise InputError(
-                f"job: one table picks {min(picks - wanted)!r}, too, beside "
-                f"{min(picks & wanted)!r}; pick each loop by a table of its own"
-            )
+    cut = _picks(job, part)
+    whole = [bool(picks) and picks <= set(names) for picks in cut]
+    stays = set().union(*(picks for picks, each in zip(cut, whole, strict=True) if each))
     source = tomllib.loads(job.text)
-    gone = [each for each, picks in zip(source["contour"], cut, strict=True) if not picks & wanted]
-    text = with_loops(job, part, [name for name in names if not any(name in p for p in cut)])
+    gone = [each for each, stay in zip(source["contour"], whole, strict=True) if not stay]
+    text = _with_loops(job, part, [name for name in names if name not in stays], cut, stays)
     tables: list[Mapping[str, object]] = list(tomllib.loads(text)["contour"])
     for index in reversed(range(len(tables))):
         if tables[index] in gone:

@@ -475,6 +475,9 @@ class Panel:
             (made["why"] if made and made["why"] else "") or session.export_folder()
         )
         self._show_remedies(made)
+        for label in (self.status, self.verdict, self.remedies, self.legend, self.written):
+            # The box around the panel would cut off their last lines.
+            label.setMinimumHeight(max(label.heightForWidth(label.width()), 0))
         self.settings.refresh()
         self._moment()
 
