@@ -166,7 +166,7 @@ class CollisionFreeSearch:
         for p in np.argsort(-hits.sum(axis=0), kind="stable")[:PAIRS_NAMED]:
             if hits[:, p].any():
                 one, two = self._cell.pair_names[p]
-                deep = -over[hits[:, p], p] * 1e3
+                deep = np.abs(over[hits[:, p], p]) * 1e3
                 nearest.append(
                     f"{one} and {two} at {hits[:, p].sum()} of {len(some)} poses, "
                     f"{deep.min():.3g} to {deep.max():.3g} mm nearer than allowed"
@@ -177,7 +177,7 @@ class CollisionFreeSearch:
         least = ""
         if hits.any(axis=1).all():
             one, two = self._cell.pair_names[int(np.argmin(over[best]))]
-            lack = -over[best].min() * 1e3
+            lack = abs(over[best].min()) * 1e3
             least = f"; the best pose is {lack:.3g} mm too near ({one} and {two})"
         return f" (most often {'; '.join(nearest)}{least})"
 
