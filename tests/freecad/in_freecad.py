@@ -15,6 +15,7 @@ import FreeCAD as App
 import FreeCADGui as Gui
 import ImportGui
 import Part
+import pivy.coin  # noqa: F401  # FreeCAD 1.0 gives the camera of a view only after it
 from PySide import QtCore, QtGui
 
 OUT, PART = os.environ["KERFPATH_TEST_OUT"], os.environ["KERFPATH_TEST_PART"]

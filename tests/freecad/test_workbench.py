@@ -61,9 +61,8 @@ def session(tmp_path_factory):
         for name in SHOWN:
             shutil.copy(out / f"{name}.png", Path(pictures) / f"freecad-{name}.png")
     results = out / "results.json"
-    assert results.exists(), done.stdout[
-        -4000:
-    ]  # its exit code says nothing: FreeCAD may crash then
+    # Its exit code says nothing: FreeCAD may crash when it ends.
+    assert results.exists(), done.stdout[-4000:]
     return json.loads(results.read_text()), out
 
 
