@@ -15,6 +15,7 @@ from kerfpath.contour import Contour, turned_about
 from kerfpath.errors import InputError
 from kerfpath.execution import ASSUMED
 from kerfpath.job.format import Drawing, pose, toml_lines, toml_value
+from kerfpath.job.format.tables.part import PickTable
 from kerfpath.post import languages
 from kerfpath.robots import Robot
 from kerfpath.robots import robot as library_robot
@@ -299,12 +300,11 @@ def _picked(part: Part, loops: Sequence[Loop]) -> str | None:
             continue
         low = np.floor(min(sizes) / SIZE_STEP) * SIZE_STEP
         high = np.ceil(max(sizes) / SIZE_STEP) * SIZE_STEP
-        size = [float(f"{end * 1e3:.6g}") for end in (low, high)]
-        ends = size[0] / 1e3, size[1] / 1e3
-        by_size = (ends, None) if name == "diameter" else (None, ends)
-        found = part.pick(kind=kind, diameter=by_size[0], length=by_size[1]) if low > 0 else ()
-        if {loop.name for loop in found} == names:
-            return toml_lines({"kind": kind, f"{name}_mm": size})
+        if low <= 0:
+            continue
+        keys = {"kind": kind, f"{name}_mm": [float(f"{end * 1e3:.6g}") for end in (low, high)]}
+        if {loop.name for loop in PickTable.model_validate(keys).loops(part)} == names:
+            return toml_lines(keys)
     return None
 
 

@@ -53,7 +53,7 @@ class GeneralArm(NamedTuple):
 
 
 @jit_part
-def _turn(v: Array, along: Array, s: float, c: float) -> None:
+def turn(v: Array, along: Array, s: float, c: float) -> None:
     """Turn the vector v (3,) about a direction by an angle with sine s and cosine c."""
     x, y, z = v
     a, b, e = along
@@ -64,13 +64,21 @@ def _turn(v: Array, along: Array, s: float, c: float) -> None:
 
 
 @jit_part
-def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> None:
+def turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> None:
     """Turn the point v (3,) about a line."""
     for r in range(3):
         v[r] -= place[r]
-    _turn(v, along, s, c)
+    turn(v, along, s, c)
     for r in range(3):
         v[r] += place[r]
+
+
+@jit_part
+def turn_pose(T: Array, place: Array, along: Array, s: float, c: float) -> None:
+    """Turn the pose T (4, 4) about a line."""
+    for k in range(3):
+        turn(T[:3, k], along, s, c)
+    turn_about(T[:3, 3], place, along, s, c)
 
 
 @jit_part
@@ -80,11 +88,9 @@ def _chain(arm: GeneralArm, q: Array, out_place: Array, out_along: Array, out_T:
     for i in range(5, -1, -1):
         place, along, s, c = arm.place[i], arm.along[i], sin(q[i]), cos(q[i])
         for j in range(i + 1, 6):
-            _turn(out_along[j], along, s, c)
-            _turn_about(out_place[j], place, along, s, c)
-        for k in range(3):
-            _turn(out_T[:3, k], along, s, c)
-        _turn_about(out_T[:3, 3], place, along, s, c)
+            turn(out_along[j], along, s, c)
+            turn_about(out_place[j], place, along, s, c)
+        turn_pose(out_T, place, along, s, c)
 
 
 @jit_part

@@ -20,12 +20,13 @@ singularity.
 
 from __future__ import annotations
 
-from math import acos, atan2, sqrt
+from math import acos, atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from kerfpath.arrays import Array, Bools
+from kerfpath.kernels.general import turn, turn_pose
 from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import REACH, wrap
 
@@ -56,21 +57,9 @@ def _dot(u: Array, v: Array) -> float:
 @jit_part
 def _turned(v: Array, along: Array, angle: float) -> Array:
     """Return the vector v (3,) turned about a direction by an angle."""
-    s, c = np.sin(angle), np.cos(angle)
-    d = (1.0 - c) * _dot(along, v)
-    out = np.empty(3)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        out[i] = c * v[i] + s * (along[j] * v[k] - along[k] * v[j]) + d * along[i]
+    out = v.copy()
+    turn(out, along, sin(angle), cos(angle))
     return out
-
-
-@jit_part
-def _turn(T: Array, place: Array, along: Array, angle: float) -> None:
-    """Turn the pose T (4, 4) about a line."""
-    for k in range(3):
-        T[:3, k] = _turned(T[:3, k], along, angle)
-    T[:3, 3] = place + _turned(T[:3, 3] - place, along, angle)
 
 
 @jit_part
@@ -114,10 +103,8 @@ def forward(arm: SevenArm, q: Array, out_T: Array) -> None:
     """Tip pose (4, 4) of a joint vector (7,)."""
     out_T[:] = arm.tip
     for k in range(7):
-        if arm.backwards:
-            _turn(out_T, arm.place[k], arm.along[k], -q[6 - k])
-        else:
-            _turn(out_T, arm.place[6 - k], arm.along[6 - k], q[6 - k])
+        i, angle = (k, -q[6 - k]) if arm.backwards else (6 - k, q[6 - k])
+        turn_pose(out_T, arm.place[i], arm.along[i], sin(angle), cos(angle))
 
 
 @jit_part
@@ -144,7 +131,7 @@ def inverse(arm: SevenArm, T: Array, given: float, out_q: Array, out_reach: Bool
     out_reach[:] = False
     place, along = arm.place, arm.along
     g = _to_from(arm.tip, T) if arm.backwards else _to_from(T, arm.tip)
-    _turn(g, place[0], along[0], -given)
+    turn_pose(g, place[0], along[0], -sin(given), cos(given))
     S, W = place[1], place[6]
     # The place of W, from S; and its distance from S, by joint 4 alone.
     wanted = g[:3, 3] - S

@@ -221,6 +221,7 @@ def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, StationRobo
             robot = _robot(request, around, Path(folder))
             cell = None if around is None else _cell(robot, tool, T_base_world, around)
     end = float(path.contour.s[-1])
+    fixed = GammaWindow(start=0.0, end=end, low=0.0, high=0.0)
     made = plan(
         path.contour,
         robot,
@@ -228,9 +229,7 @@ def _planned(request: Mapping[str, Any], path: _Path) -> tuple[Plan, StationRobo
         placement=T_base_world,
         speed=scalar(request["speed"], "speed", unit="m/s", above=0.0),
         gamma_step=request["gamma_step"],
-        gamma_windows=()
-        if path.contour.x is None
-        else (GammaWindow(start=0.0, end=end, low=0.0, high=0.0),),
+        gamma_windows=() if path.contour.x is None else (fixed,),
         cell=cell,
         start_q=start,
         end_q=request.get("end"),
@@ -243,11 +242,10 @@ def _robot(request: Mapping[str, Any], around: Mapping[str, Any] | None, folder:
     """Return the robot of the description, with the meshes of its links for what is around it."""
     n, file = len(request["joints"]), folder / "robot.urdf"
     limit = positive(np.atleast_1d(request["acceleration"]), "acceleration", (None,))
-    meshes = around is not None
     if "file" in request:
-        file = Path(request["file"])
+        file, meshes = Path(request["file"]), around is not None
     else:
-        text, given = str(request["urdf"]), around["meshes"] if around is not None else {}
+        text, given = str(request["urdf"]), {} if around is None else around["meshes"]
         meshes = bool(given)
         for k, (name, mesh) in enumerate(given.items()):
             (folder / f"{k}.stl").write_bytes(_stl(*_surface(mesh, name)))

@@ -48,9 +48,7 @@ def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> genera
             "a robot of family 'general' uses the joint convention of its chain: remove sign= and "
             "offset="
         )
-    T = chain.frames(np.zeros((1, 6)))[0, 1:]
-    along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
-    place = T[:, :3, 3].copy()
+    place, along, tip = chain.lines()
     for i in range(1, 6):
         # Move the point to the foot of the common perpendicular of axes i - 1 and i.
         normal = np.cross(along[i - 1], along[i])
@@ -58,7 +56,7 @@ def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> genera
         if np.linalg.norm(normal) > PARALLEL:
             gap = np.cross(along[i - 1], gap) @ normal / (normal @ normal) * along[i]
         place[i] += (gap @ along[i]) * along[i]
-    return general.GeneralArm(place=place, along=along, tip=T[-1] @ chain.end)
+    return general.GeneralArm(place=place, along=along, tip=tip)
 
 
 def inverse_all(arm: general.GeneralArm, T: Array, out_q: Array, out_reach: Bools) -> None:

@@ -160,9 +160,7 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> tuple[Arm, 
 
 
 def _lines(chain: KinematicChain) -> _Lines:
-    T = chain.frames(np.zeros((1, len(chain.axes))))[0, 1:]
-    along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
-    place = T[:, :3, 3]
+    place, along, tip = chain.lines()
     sign = -1.0 if along[0, 2] < -NEARLY else 1.0
     z = sign * along[0]
     x = np.eye(3)[0] if abs(z[0]) < 0.9 else -np.eye(3)[2]
@@ -173,9 +171,7 @@ def _lines(chain: KinematicChain) -> _Lines:
     foot[:3, 3] = place[0] - (place[0] @ z) * z
     foot = _tidy(foot)
     R = foot[:3, :3]
-    return _Lines(
-        foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ T[-1] @ chain.end, sign
-    )
+    return _Lines(foot, (place - foot[:3, 3]) @ R, along @ R, np.linalg.inv(foot) @ tip, sign)
 
 
 def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:

@@ -32,14 +32,13 @@ def _model(
             "a seven-axis arm with an offset shoulder or wrist uses the joint convention of its "
             "chain: remove sign= and offset="
         )
-    T = chain.frames(np.zeros((1, 7)))[0, 1:]
-    place, along = T[:, :3, 3].copy(), np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
+    place, along, tip = chain.lines()
     if backwards:
         place, along = place[::-1].copy(), -along[::-1]
     place[1:3] = _meeting_point(place[1:3], along[1:3])
     place[4:] = _meeting_point(place[4:], along[4:])
     return seven.SevenArm(
-        place=place, along=np.array(along, order="C"), tip=T[-1] @ chain.end, backwards=backwards
+        place=place, along=np.array(along, order="C"), tip=tip, backwards=backwards
     )
 
 

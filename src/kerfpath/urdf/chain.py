@@ -267,6 +267,15 @@ class KinematicChain:
         steps = np.linalg.norm(self.origins[1:, :3, 3], axis=1)
         return float(steps.sum() + np.linalg.norm(self.end[:3, 3]))
 
+    def lines(self) -> tuple[Array, Array, Array]:
+        """Return a point (n, 3) m and the direction (n, 3) of each joint axis, all joints at zero.
+
+        The third is the pose (4, 4) m of the end there. All are in the base.
+        """
+        T = self.frames(np.zeros((1, len(self.axes))))[0, 1:]
+        along = np.einsum("nij,nj->ni", T[:, :3, :3], self.axes)
+        return T[:, :3, 3].copy(), along, T[-1] @ self.end
+
     def frames(self, q: Array) -> Array:
         """Return the poses (B, n+1, 4, 4) in the base of all frames at q (B, n) rad."""
         B, n = q.shape

@@ -310,14 +310,25 @@ def read_srdf(path: str | PathLike[str], urdf: str | PathLike[str]) -> dict[Link
         description, a pair of one link with itself, a pair that is both disabled and enabled, or
         <disable_default_collisions>.
     """
+    return disabled_pairs(*read_semantic_root(path, urdf), Path(path))
+
+
+def read_semantic_root(
+    path: str | PathLike[str], urdf: str | PathLike[str]
+) -> tuple[ElementTree.Element, Tree]:
+    """Return the root of an SRDF and the tree of its description; raises as `read_srdf`."""
     path, urdf = Path(path), Path(urdf)
-    root = read_root(path, "semantic description (SRDF)")
-    tree = read_tree(urdf, 0.0)
+    root, tree = read_root(path, "semantic description (SRDF)"), read_tree(urdf, 0.0)
     if root.get("name") != tree.name:
         raise InputError(
             f"{path}: describes the robot {root.get('name', '')!r}, but {urdf.name} describes "
             f"{tree.name!r}; expected the same name"
         )
+    return root, tree
+
+
+def disabled_pairs(root: ElementTree.Element, tree: Tree, path: Path) -> dict[LinkPair, str]:
+    """Return what `read_srdf` does, from what `read_semantic_root` returns."""
     if root.find("disable_default_collisions") is not None:
         raise InputError(
             f"{path}: <disable_default_collisions> disables every pair of a link; list the pairs "

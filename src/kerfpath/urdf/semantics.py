@@ -13,8 +13,8 @@ import numpy as np
 from kerfpath.arrays import Array, floats, freeze, short_repr
 from kerfpath.errors import InputError
 from kerfpath.names import listed
-from kerfpath.urdf.description import LinkPair, read_srdf
-from kerfpath.urdf.tree import Joint, Tree, read_root, read_tree
+from kerfpath.urdf.description import LinkPair, disabled_pairs, read_semantic_root
+from kerfpath.urdf.tree import Joint, Tree
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -130,8 +130,8 @@ def read_semantics(path: str | PathLike[str], urdf: str | PathLike[str]) -> Sema
         lacks a joint of its group or gives it several values.
     """
     path = Path(path)
-    disabled = read_srdf(path, urdf)
-    root, tree = read_root(path, "semantic description (SRDF)"), read_tree(Path(urdf), 0.0)
+    root, tree = read_semantic_root(path, urdf)
+    disabled = disabled_pairs(root, tree, path)
     elements = {_text(e, "name", path): e for e in root.findall("group")}
     joints = {joint.name: joint for joint in tree.joints}
     passive = {_text(e, "name", path) for e in root.findall("passive_joint")}

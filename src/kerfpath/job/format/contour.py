@@ -220,10 +220,12 @@ class ContourSpec:
         """
         if self.table.pick_all is None:
             loop = part.loop(self.pick)
-            return [replace(self._of_size(loop)._at_speed(loop), pick=loop.name, name=self.name)]
+            named = {self.name: loop}
+        else:
+            named = {loop.name: loop for loop in self.table.pick_all.loops(part)}
         return [
-            replace(self._of_size(loop)._at_speed(loop), pick=loop.name, name=loop.name)
-            for loop in self.table.pick_all.loops(part)
+            replace(self._of_size(loop)._at_speed(loop), pick=loop.name, name=name)
+            for name, loop in named.items()
         ]
 
     def _at_speed(self, loop: Loop) -> ContourSpec:

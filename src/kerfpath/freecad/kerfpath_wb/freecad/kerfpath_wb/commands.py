@@ -108,7 +108,7 @@ def picked():
                 groups[name] = [edges[number]]
             else:
                 for i, wire in enumerate(shape.Faces[number].Wires):
-                    groups["{} of {}".format("wire {}".format(i + 1), name)] = wire.Edges
+                    groups["wire {} of {}".format(i + 1, name)] = wire.Edges
     if not found:
         raise geometry.PickError(
             tr("nothing to cut is picked: pick edges or faces of the part first")
@@ -210,14 +210,18 @@ class Remove(_Command):
         remove_contours(contours_picked())
 
 
-class Fixture(_Command):
+class _JobCommand(_Command):
+    """A command for a document with a job."""
+
+    def IsActive(self):
+        return bool(App.ActiveDocument and session.job_of(App.ActiveDocument))
+
+
+class Fixture(_JobCommand):
     """What the robot keeps clear of."""
 
     NAME, MENU, KEYS = "fixture", "Keep clear of it", "K, F"
     TIP = "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions"
-
-    def IsActive(self):
-        return bool(App.ActiveDocument and session.job_of(App.ActiveDocument))
 
     def run(self):
         job = session.job_of(App.ActiveDocument)
@@ -235,14 +239,11 @@ class Fixture(_Command):
         _at_work(job.Document, job.Part)
 
 
-class Plan(_Command):
+class Plan(_JobCommand):
     """The panel of the job."""
 
     NAME, MENU, KEYS = "kerfpath", "Plan and play", "K, P"
     TIP = "Show the panel of the job: plan, play, settings, program"
-
-    def IsActive(self):
-        return bool(App.ActiveDocument and session.job_of(App.ActiveDocument))
 
     def run(self):
         open_panel(session.job_of(App.ActiveDocument))

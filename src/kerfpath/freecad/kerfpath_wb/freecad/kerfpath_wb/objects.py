@@ -17,7 +17,17 @@ FAULT_COLOUR = (0.86, 0.08, 0.24)
 
 
 class _Proxy:
-    """What a document keeps of a proxy: nothing."""
+    """The proxy of an object with `PROPERTIES`, of which a document keeps nothing more."""
+
+    PROPERTIES = ()
+
+    def __init__(self, obj):
+        obj.Proxy = self
+        for kind, name, about in self.PROPERTIES:
+            obj.addProperty(kind, name, "Kerfpath", about)
+
+    def execute(self, obj):
+        """Nothing follows from the properties."""
 
     def dumps(self):
         return None
@@ -33,9 +43,6 @@ class _View(_Proxy):
 
     NAME = "kerfpath"
 
-    def __init__(self, view):
-        view.Proxy = self
-
     def attach(self, view):
         self.Object = view.Object
 
@@ -50,20 +57,14 @@ class _View(_Proxy):
 class Job(_Proxy):
     """A job: its text as TOML, the object that is cut, and what belongs to it."""
 
-    def __init__(self, obj):
-        obj.Proxy = self
-        for kind, name, about in (
-            ("App::PropertyString", "Job", "The job file, TOML"),
-            ("App::PropertyLinkGlobal", "Part", "What is cut"),
-            ("App::PropertyLink", "Robot", "Its place is that of the robot base"),
-            ("App::PropertyLinkList", "Contours", "What is cut of the part"),
-            ("App::PropertyLinkListGlobal", "Fixtures", "What the robot keeps clear of"),
-            ("App::PropertyPath", "Folder", "Where programs are written; empty: by the document"),
-        ):  # fmt: skip
-            obj.addProperty(kind, name, "Kerfpath", about)
-
-    def execute(self, obj):
-        """Nothing follows from the rest."""
+    PROPERTIES = (
+        ("App::PropertyString", "Job", "The job file, TOML"),
+        ("App::PropertyLinkGlobal", "Part", "What is cut"),
+        ("App::PropertyLink", "Robot", "Its place is that of the robot base"),
+        ("App::PropertyLinkList", "Contours", "What is cut of the part"),
+        ("App::PropertyLinkListGlobal", "Fixtures", "What the robot keeps clear of"),
+        ("App::PropertyPath", "Folder", "Where programs are written; empty: by the document"),
+    )
 
 
 class JobView(_View):
@@ -88,15 +89,15 @@ class JobView(_View):
 class Contour(_Proxy):
     """A loop of the part that is cut: its edges by name, with a fingerprint of each."""
 
+    PROPERTIES = (
+        ("App::PropertyLinkSubGlobal", "Edges", "The edges of the loop"),
+        ("App::PropertyString", "Fingerprints", "What these edges look like, JSON"),
+        ("App::PropertyString", "Loop", "Its name in kerfpath"),
+        ("App::PropertyString", "Problem", "Why it cannot be cut"),
+    )
+
     def __init__(self, obj):
-        obj.Proxy = self
-        for kind, name, about in (
-            ("App::PropertyLinkSubGlobal", "Edges", "The edges of the loop"),
-            ("App::PropertyString", "Fingerprints", "What these edges look like, JSON"),
-            ("App::PropertyString", "Loop", "Its name in kerfpath"),
-            ("App::PropertyString", "Problem", "Why it cannot be cut"),
-        ):
-            obj.addProperty(kind, name, "Kerfpath", about)
+        super().__init__(obj)
         obj.setEditorMode("Fingerprints", 2)  # hidden
         for name in ("Loop", "Problem"):
             obj.setEditorMode(name, 1)  # read only
@@ -172,13 +173,11 @@ def names_of(contour):
 class Robot(_Proxy):
     """The robot with its head; its placement is that of its base."""
 
-    def __init__(self, obj):
-        obj.Proxy = self
-        obj.addProperty("App::PropertyString", "Model", "Kerfpath", "Its id in the library")
-        obj.setEditorMode("Model", 1)
+    PROPERTIES = (("App::PropertyString", "Model", "Its id in the library"),)
 
-    def execute(self, obj):
-        """Nothing follows from the rest."""
+    def __init__(self, obj):
+        super().__init__(obj)
+        obj.setEditorMode("Model", 1)
 
 
 class RobotView(_View):

@@ -238,7 +238,7 @@ class Panel:
     """
 
     def __init__(self, session):
-        self.session = session
+        self.session, self._layers = session, None
         self.form = QtWidgets.QWidget()
         self.form.setWindowTitle(tr("Kerfpath"))
         self.form.setWindowIcon(QtGui.QIcon(objects.icon("kerfpath")))
@@ -540,7 +540,7 @@ class Panel:
         chosen = message["course"][0]["posture"][0] if message["course"] else None
         names = [each["name"] for each in message["layers"]]
         postures = [each["posture"] for each in message["layers"]]
-        if (name, postures) != getattr(self, "_layers", None):
+        if (name, postures) != self._layers:
             self._layers = (name, postures)
             now = names[postures.index(chosen)] if chosen in postures else names[0]
             self._fill(self.posture, names, now, postures)

@@ -90,12 +90,12 @@ def find(preference="", written="", own="", variables=None):
     if written and os.path.isfile(written):
         with open(written, encoding="utf-8") as file:
             recorded = file.read().strip()
-    told = (
+    named = (
         (preference, "the preference of the workbench names"),
         (given.get("KERFPATH", ""), "the variable KERFPATH names"),
         (recorded, "`kerfpath freecad` has written"),
     )
-    for path, who in told:
+    for path, who in named:
         if path:
             try:
                 return command_of(path)

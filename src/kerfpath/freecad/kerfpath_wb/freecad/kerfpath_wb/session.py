@@ -343,9 +343,7 @@ class Session(QtCore.QObject):
             if take is not None:
                 try:
                     take(message)
-                except geometry.PickError as error:
-                    self._say(str(error))
-                except ProcessError as error:
+                except (geometry.PickError, ProcessError) as error:
                     self._say(str(error))
             self.heard.emit(kind)
             if self.studio is None:
