@@ -115,6 +115,7 @@ def test_a_circle_with_a_tool_in_millimetres_from_a_moved_base(compas):
     require_met(cell, state, found, waypoints, 1e-8)
     assert found.joint_names == cell.get_configurable_joint_names()
     assert found.points[0].joint_values == UR
+    assert (found.attributes["speed"], found.attributes["acceleration"]) == (0.15, 8.0)
     assert not any(found.points[0].velocities)
     times = [p.time_from_start.seconds for p in found.points]
     assert times[0] == 0
@@ -185,7 +186,9 @@ def test_errors_are_those_of_the_interface(compas):
     nameless.robot_configuration = type(nameless.robot_configuration)([0.0] * 6, [0] * 6)
     with pytest.raises(ValueError, match="joint_names"):
         planner.plan_cartesian_motion(near, nameless, options=free)
-    with compas.Client(python="/no/such/python") as client:
+    with pytest.raises(TypeError, match="'acceleration'"):
+        compas.Client()
+    with compas.Client(python="/no/such/python", acceleration=8.0) as client:
         planner = compas.Planner(client)
         planner.set_robot_cell(cell, state)
         with pytest.raises(backends.MotionPlanningError, match="expected the path of a Python"):

@@ -2,9 +2,12 @@
 
 import ast
 import configparser
+import os
 import re
+import signal
+import subprocess
 import sys
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -377,36 +380,49 @@ def test_the_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     np.testing.assert_allclose(*ends, atol=1e-12)
 
 
-def test_the_node_plans_and_publishes_with_stand_ins_for_ros(setting, monkeypatch):
-    """The lines of the node run; what rclpy itself does with them is not tried here."""
-    published, ended, filled = [], [], []
+class Unset(Exception):
+    """As ParameterUninitializedException of rclpy."""
 
-    class Node:
-        def __init__(self, name):
-            self.values = {
-                "robot_description": setting.urdf.read_text(),
-                "robot_description_semantic": setting.srdf.read_text(),
-            }
 
-        def declare_parameter(self, name, default):
-            self.values.setdefault(name, default)
+class Node:
+    """A stand-in for that of rclpy: a parameter that is only declared with its type is not set."""
 
-        def get_parameter(self, name):
-            return SimpleNamespace(value=self.values[name])
+    parameters = MappingProxyType({})
 
-        def create_publisher(self, *_):
-            return SimpleNamespace(publish=published.append)
+    def __init__(self, name):
+        self.declared, self.published, self.warned = {}, [], []
 
-        def get_logger(self):
-            return SimpleNamespace(warning=ended.append)
+    def declare_parameter(self, name, kind):
+        self.declared[name] = kind
 
+    def get_parameter(self, name):
+        if name not in self.parameters:
+            raise Unset(name)
+        assert self.declared[name] == ("double[]" if name == "acceleration" else "string")
+        return SimpleNamespace(value=self.parameters[name])
+
+    def create_publisher(self, *_):
+        return SimpleNamespace(publish=self.published.append)
+
+    def get_logger(self):
+        return SimpleNamespace(warning=self.warned.append)
+
+
+@pytest.fixture
+def node_of(setting, monkeypatch):
+    """The node of the example with given parameters, and what it has filled messages with."""
+    filled = []
     Plan = SimpleNamespace(Feedback=SimpleNamespace, Result=SimpleNamespace)
+    kinds = SimpleNamespace(STRING="string", DOUBLE_ARRAY="double[]")
+    accept = SimpleNamespace(ACCEPT="accept")
     for name, values in {
         "rclpy": {},
-        "rclpy.action": {"ActionServer": lambda *_, **__: None},
+        "rclpy.action": {"ActionServer": lambda *_, **more: more, "CancelResponse": accept},
         "rclpy.callback_groups": {"ReentrantCallbackGroup": object},
+        "rclpy.exceptions": {"ParameterUninitializedException": Unset},
         "rclpy.executors": {"MultiThreadedExecutor": object},
         "rclpy.node": {"Node": Node},
+        "rclpy.parameter": {"Parameter": SimpleNamespace(Type=kinds)},
         "ament_index_python.packages": {"get_package_share_directory": str},
         "kerfpath_msgs.action": {"Plan": Plan},
         "moveit_msgs.msg": {"DisplayTrajectory": SimpleNamespace},
@@ -415,20 +431,106 @@ def test_the_node_plans_and_publishes_with_stand_ins_for_ros(setting, monkeypatc
         monkeypatch.setitem(sys.modules, name, SimpleNamespace(**values))
     names = {}
     exec(compile(NODE.read_text(), str(NODE), "exec"), names)
-    (folder := setting.urdf.parent / "node").mkdir()
-    node = names["Planner"](folder)
-    handle = SimpleNamespace(
-        request=goal(), publish_feedback=lambda _: None,
-        succeed=lambda: ended.append("succeed"), abort=lambda: ended.append("abort"),
-    )  # fmt: skip
+    whole = {
+        "robot_description": setting.urdf.read_text(),
+        "robot_description_semantic": setting.srdf.read_text(),
+        "acceleration": [8.0],
+    }
+
+    def made_with(**changed):
+        merged = {**whole, **changed}
+        given = {name: value for name, value in merged.items() if value is not None}
+        monkeypatch.setattr(Node, "parameters", given)
+        folder = setting.urdf.parent / "node"
+        folder.mkdir()
+        return names["Planner"](folder), filled
+
+    return made_with
+
+
+class Handle:
+    """A stand-in for a goal handle; `cancelled` says whether it is to be cancelled."""
+
+    def __init__(self, request, cancelled=lambda: False):
+        self.request, self.cancelled, self.ended = request, cancelled, []
+
+    def publish_feedback(self, feedback):
+        assert feedback.state == "planning"
+
+    @property
+    def is_cancel_requested(self):
+        return self.cancelled()
+
+    def succeed(self):
+        self.ended.append("succeed")
+
+    def abort(self):
+        self.ended.append("abort")
+
+    def canceled(self):
+        self.ended.append("canceled")
+
+
+def planning():
+    """The numbers of the processes that plan goals of this one."""
+    asked = ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(os.getpid())]
+    lines = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.splitlines()
+    return [int(line.split()[0]) for line in lines if "kerfpath.pipe" in line]
+
+
+def test_the_node_plans_and_publishes_with_stand_ins_for_ros(node_of):
+    """The lines of the node run; what rclpy itself does with them is not tried here."""
+    node, filled = node_of()
+    handle = Handle(goal(check_collisions=True, scene=scene(box("far", [3, 3, 3]))))
     node.execute(handle)
-    assert ended == ["succeed"]
-    assert len(published) == 1
+    assert handle.ended == ["succeed"]
+    assert len(node.published) == 1
     assert filled[0]["error_code"] == {"val": 1}
     made("kerfpath_msgs/action/Plan_Result", filled[0])
     made("moveit_msgs/msg/DisplayTrajectory", filled[1])
-    handle.request = goal(group="hand")
+    refused = Handle(goal(group="hand"))
+    node.execute(refused)
+    assert refused.ended == ["abort"]
+    assert "'hand' is not in the SRDF" in node.warned[0]
+    assert len(node.published) == 1
+
+
+@pytest.mark.parametrize(
+    "name", ["robot_description", "robot_description_semantic", "acceleration"]
+)
+def test_the_node_asks_for_what_is_not_set(node_of, name):
+    with pytest.raises(SystemExit, match=f"parameter {name} is not set: give the .+$"):
+        node_of(**{name: None})
+
+
+def test_a_goal_that_is_cancelled_is_planned_no_further(node_of):
+    node, filled = node_of()
+    assert node.server["cancel_callback"](None) == "accept"
+    pids = []
+
+    def cancelled():
+        pids.extend(planning())
+        return bool(pids)
+
+    handle = Handle(goal(count=400, max_step=0.001), cancelled)
     node.execute(handle)
-    assert ended[2] == "abort"
-    assert "'hand' is not in the SRDF" in ended[1]
-    assert len(published) == 1
+    assert handle.ended == ["canceled"]
+    assert filled[0]["error_code"] == {"val": -7}
+    made("kerfpath_msgs/action/Plan_Result", filled[0])
+    assert not node.published
+    with pytest.raises(ProcessLookupError):
+        os.kill(pids[0], 0)
+
+
+def test_a_goal_whose_process_dies_is_aborted(node_of):
+    node, filled = node_of()
+
+    def cancelled():
+        for pid in planning():
+            os.kill(pid, signal.SIGKILL)
+        return False
+
+    handle = Handle(goal(), cancelled)
+    node.execute(handle)
+    assert handle.ended == ["abort"]
+    assert filled[0]["message"] == "the planning process ended with exit code -9"

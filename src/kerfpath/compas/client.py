@@ -163,10 +163,10 @@ class KerfpathClient(ClientInterface):
     python : str, optional
         Path of a Python in which kerfpath is installed, which is run as a process. Default: the
         kerfpath of this Python.
-    speed : float m/s
-        Speed along the waypoints.
     acceleration : float rad/s^2, or one for each joint
-        Acceleration limits of the joints, which robot descriptions do not have.
+        Acceleration limits of the joints, which robot models do not have: there is no default.
+    speed : float m/s
+        Speed along the waypoints, unless the options of a motion have another one.
     gamma_step : float rad
         Step of the free rotation about the tool axis, for `PointAxisWaypoints`.
     seconds : float s, optional
@@ -174,7 +174,7 @@ class KerfpathClient(ClientInterface):
     """
 
     def __init__(
-        self, python=None, speed=0.1, acceleration=10.0, gamma_step=GAMMA_STEP, seconds=None
+        self, python=None, *, acceleration, speed=0.1, gamma_step=GAMMA_STEP, seconds=None
     ):
         super().__init__()
         self.speed, self.acceleration, self.gamma_step = speed, acceleration, gamma_step
@@ -238,7 +238,8 @@ class KerfpathPlanner(SetRobotCell, SetRobotCellState, PlanCartesianMotion, Plan
         -------
         JointTrajectory
             With times, velocities and accelerations; ``attributes["waypoints"]`` has the numbers of
-            the points at the waypoints.
+            the points at the waypoints, ``attributes["speed"]`` (m/s) and
+            ``attributes["acceleration"]`` (rad/s^2) what was planned with.
 
         Raises
         ------
@@ -270,7 +271,8 @@ class KerfpathPlanner(SetRobotCell, SetRobotCellState, PlanCartesianMotion, Plan
         found = self.client.ask(request)
         if "error" in found:
             raise _error(found, waypoints, start_state)
-        return _trajectory(found, cell, group, start_state)
+        kept = {name: request[name] for name in ("speed", "acceleration")}
+        return _trajectory(found | kept, cell, group, start_state)
 
 
 # -----------------------------------------------------------------------------
@@ -510,5 +512,7 @@ def _trajectory(found, cell, group, state):
             "planning_time": found["seconds"],
             "waypoints": found["waypoints"],
             "cost": found["cost"],
+            "speed": found["speed"],
+            "acceleration": found["acceleration"],
         },
     )

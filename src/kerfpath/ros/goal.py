@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import os
+import subprocess
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,15 +15,23 @@ import numpy as np
 
 from kerfpath.arrays import Array, floats, scalar, short_repr
 from kerfpath.errors import InputError
+from kerfpath.isolated import clean_environment, python_command
 from kerfpath.pipe import answer
 from kerfpath.ros.scene import around_robot, pose
 from kerfpath.urdf import Group, Semantics, read_semantics
 
-SUCCESS, FAILURE, INVALID_GROUP_NAME = 1, 99999, -15
+SUCCESS, FAILURE, INVALID_GROUP_NAME, PREEMPTED = 1, 99999, -15, -7
 CODES = {"start": -10, "end": -12, "reach": -31, "path": -1, "input": FAILURE}
 """Values of moveit_msgs/MoveItErrorCodes for the errors of `kerfpath.pipe.answer`."""
 STEP = 0.01
 """m: largest distance of two points of a trajectory, unless the goal has another one."""
+LOOK = 0.1
+"""s between two looks whether a goal is cancelled."""
+APART = (
+    "from kerfpath.isolated import end_with; end_with({}); "
+    "from kerfpath.pipe.__main__ import main; main()"
+)
+"""What a process runs that plans a goal; it ends with the process of this number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +59,9 @@ class Setting:
     __repr__ = short_repr
 
 
-def plan_goal(goal: Any, setting: Setting) -> dict[str, Any]:
+def plan_goal(
+    goal: Any, setting: Setting, cancelled: Callable[[], bool] | None = None
+) -> dict[str, Any]:
     """Return the fields of a result of the action Plan.
 
     Parameters
@@ -55,6 +69,10 @@ def plan_goal(goal: Any, setting: Setting) -> dict[str, Any]:
     goal : kerfpath_msgs/action/Plan_Goal
         See ``examples/ros/kerfpath_msgs/action/Plan.action``.
     setting : Setting
+    cancelled : callable, optional
+        Says whether the goal is cancelled. The goal is then planned in a process of its own, which
+        is ended when it is, and the error code is that of a goal that was preempted. Default: the
+        goal is planned in this process, to its end.
 
     Returns
     -------
@@ -75,7 +93,9 @@ def plan_goal(goal: Any, setting: Setting) -> dict[str, Any]:
         request = _request(goal, setting, semantics, group)
     except InputError as error:
         return _result(FAILURE, str(error))
-    found = answer(request)
+    found = answer(request) if cancelled is None else _answered_apart(request, cancelled)
+    if found is None:
+        return _result(PREEMPTED, "the goal was cancelled")
     if "error" in found:
         return _result(CODES[found["error"]], found["message"])
     said = f"cost {found['cost']:.6g}, planned in {found['seconds']:.2f} s"
@@ -85,6 +105,34 @@ def plan_goal(goal: Any, setting: Setting) -> dict[str, Any]:
 
 def _result(code: int, message: str) -> dict[str, Any]:
     return {"error_code": {"val": code}, "message": message, "trajectory": {}}
+
+
+def _answered_apart(
+    request: Mapping[str, Any], cancelled: Callable[[], bool]
+) -> dict[str, Any] | None:
+    """Return the answer of another process; None if that was ended as the goal was cancelled."""
+    running = subprocess.Popen(
+        python_command(APART.format(os.getpid())),
+        env=clean_environment(),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    )
+    asked: str | None = json.dumps(request) + "\n"
+    try:
+        while not cancelled():
+            with suppress(subprocess.TimeoutExpired):
+                said, _ = running.communicate(asked, timeout=LOOK)
+                if not said:
+                    why = f"the planning process ended with exit code {running.returncode}"
+                    return {"error": "input", "message": why}
+                answered: dict[str, Any] = json.loads(said)
+                return answered
+            asked = None  # it is being sent
+        return None
+    finally:
+        running.kill()
+        running.communicate()
 
 
 def _request(goal: Any, setting: Setting, semantics: Semantics, group: Group) -> dict[str, Any]:
