@@ -167,7 +167,7 @@ def test_where_both_limits_rule_a_node_out_no_joint_is_named():
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("ceiling_at_work")
-@pytest.mark.parametrize(("wild", "stride"), [(0.0, 1), (0.01, 1), (0.1, 1), (0.0, 2), (0.01, 3)])
+@pytest.mark.parametrize(("wild", "stride"), [(0.0, 2), (0.01, 1), (0.1, 3)])
 def test_no_motion_is_ruled_out_by_limits_that_it_keeps(
     arm, tool, placement, wild, stride, monkeypatch
 ):
@@ -191,7 +191,7 @@ def test_no_motion_is_ruled_out_by_limits_that_it_keeps(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_plan_reaches_the_ceiling_of_the_speed(seed, arm, tool, placement):
     nodes = drawn(seed)
     options = {"tool": tool, "placement": placement, "gamma_step": STEP}
