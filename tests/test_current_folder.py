@@ -101,11 +101,11 @@ COMMANDS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", FOLDERS)
-def test_the_commands_import_nothing_from_there(place, imported, where):
-    for words in COMMANDS:
-        done([*COMMAND, *words.split()], place / where)
-        assert imported() == set(), words
+def test_the_commands_import_nothing_from_there(place, imported):
+    for where in FOLDERS:
+        for words in COMMANDS if where == "job" else ["contours ../drawing/b_pillar.step"]:
+            done([*COMMAND, *words.split()], place / where)
+            assert imported() == set(), words
 
 
 @pytest.mark.slow

@@ -116,8 +116,8 @@ def test_of_half_a_turn_both_ways_are_as_long_but_not_as_even():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_the_optimum_agrees_on_ten_thousand_instances(seed):
+@pytest.mark.parametrize("seed", range(2))
+def test_the_optimum_agrees_on_five_thousand_instances(seed):
     rng = np.random.default_rng(100 + seed)
     for _ in range(2500):
         agree(rng, str(rng.choice(["free", "free", "periodic"])), layers=(1, 8), size=(1, 8))
