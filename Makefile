@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 DEMO_OUT ?= demo-out
+# Commands are started a thousand times by the tests: modules are compiled once, as everywhere else.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test test-slow check docs package bench figures screenshots lock clean
 
