@@ -332,6 +332,73 @@ def a_robot_that_is_moved():
     App.closeDocument(document.Name)
 
 
+def faces_and_lines():
+    """A face picks all of its loops; edges alone are open lines, on the side of a face."""
+    commands, _, session = workbench()
+    document, obj = plate([(60, 60, 15)])
+    shape = obj.Shape
+    top = next(
+        i for i, face in enumerate(shape.Faces)
+        if face.normalAt(0, 0).z > 0.9 and face.CenterOfMass.z > 2.9
+    )  # fmt: skip
+    face = "Face{}".format(top + 1)
+    by_x = {
+        "Edge{}".format(i + 1): edge.CenterOfMass.x
+        for i, edge in enumerate(shape.Edges)
+        if all(abs(v.Z - 3) < 1e-6 for v in edge.Vertexes) and len(edge.Vertexes) == 2
+    }
+    right, left = max(by_x, key=by_x.get), min(by_x, key=by_x.get)
+    front = next(
+        name for name in by_x
+        if abs(shape.Edges[int(name[4:]) - 1].CenterOfMass.y) < 1e-6
+    )  # fmt: skip
+    # The side of a lone edge is not known; two edges of one face are on that.
+    Gui.Selection.addSelection(document.Name, obj.Name, right)
+    Gui.runCommand("Kerfpath_Line")
+    assert right + ": its side is not clear" in commands.boxes[-1].text()
+    assert session.running(document) is None
+    Gui.Selection.addSelection(document.Name, obj.Name, right)
+    Gui.Selection.addSelection(document.Name, obj.Name, front)
+    Gui.runCommand("Kerfpath_Line")
+    at_work = session.running(document)
+    yield from until(lambda: at_work.job is not None, "the job is there")
+    (line,) = at_work.job.Contours
+    assert (line.Loop, sorted(line.Edges[1])) == ("line1", sorted([right, front]))
+    assert document.UndoNames == ["Kerfpath: Cut"]
+    assert abs(line.Shape.Length - 320) < 1e-6
+    yield from quick(at_work)
+    yield from until(lambda: passed(at_work) or at_work.faults or at_work.none, "it is judged")
+    assert passed(at_work), (at_work.faults, at_work.none, at_work.outcome)
+    # A second line, whose side is that of the face that is picked with it.
+    Gui.Selection.addSelection(document.Name, obj.Name, left)
+    Gui.Selection.addSelection(document.Name, obj.Name, face)
+    Gui.runCommand("Kerfpath_Line")
+    yield from until(lambda: len(at_work.job.Contours) == 2, "there are two")
+    assert [c.Loop for c in at_work.job.Contours] == ["line1", "line2"]
+    # The face alone: its outline, and its hole.
+    cut(document, obj, face)
+    yield from until(lambda: len(at_work.job.Contours) == 4, "there are four")
+    loops = [c.Shape.Length for c in at_work.job.Contours]
+    assert abs(sorted(loops)[-1] - 640) < 1e-6, loops
+    assert abs(sorted(loops)[0] - 30 * math.pi) < 1e-3, loops
+    yield from fitted()
+    picture("lines")
+    # Longer by another hole and a wider plate: numbers and points follow.
+    before = at_work.value("part.lines")
+    base = obj
+    while base.Name != "Box":
+        base = base.Base
+    base.Shape = Part.makeBox(200, 130, 3)
+    document.recompute()
+    lost = [c.Label for c in at_work.job.Contours if c.Problem]
+    assert "line1" in lost, lost  # the right edge is another one now
+    base.Shape = Part.makeBox(200, 120, 3)
+    document.recompute()
+    assert not at_work.lost()
+    assert at_work.value("part.lines") == before
+    App.closeDocument(document.Name)
+
+
 def a_model_that_changes():
     """An edge with another number is found again; one that is another edge is refused, by name."""
     _, panel, _ = workbench()
@@ -464,8 +531,8 @@ def no_kerfpath():
 
 
 SCENARIOS = (
-    the_shipped_part, steps_of_undo, a_robot_that_is_moved, a_model_that_changes, nothing_to_cut,
-    no_path, ends, no_kerfpath,
+    the_shipped_part, steps_of_undo, a_robot_that_is_moved, faces_and_lines, a_model_that_changes,
+    nothing_to_cut, no_path, ends, no_kerfpath,
 )  # fmt: skip
 chosen = os.environ.get("KERFPATH_TEST_ONLY")
 waiting = [each for each in SCENARIOS if chosen in (None, "", each.__name__)]

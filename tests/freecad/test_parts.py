@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
-from kerfpath import __version__
+from kerfpath import __version__, cad
 from kerfpath.errors import InputError
 from kerfpath.freecad import WORKBENCH, install, mod_folders
 from studio.talk import write_job
@@ -380,20 +380,57 @@ LOOPS = [
 
 
 def test_the_rim_of_a_hole_is_the_hole():
-    assert geometry.loops_of({"Edge9": [circle(50, 30, 10)]}, LOOPS) == [LOOPS[2]]
+    assert geometry.loops_of({"Edge9": [[circle(50, 30, 10)]]}, LOOPS) == [LOOPS[2]]
 
 
 def test_an_edge_between_two_faces_needs_more_of_the_loop():
     with pytest.raises(geometry.PickError, match="Edge1 is on side/outer and on top/outer"):
-        geometry.loops_of({"Edge1": [SIDES[0]]}, LOOPS)
-    two = {"Edge1": [SIDES[0]], "Edge2": [SIDES[1]]}
+        geometry.loops_of({"Edge1": [[SIDES[0]]]}, LOOPS)
+    two = {"Edge1": [[SIDES[0]]], "Edge2": [[SIDES[1]]]}
     assert geometry.loops_of(two, LOOPS) == [LOOPS[0]]
-    assert geometry.loops_of({"wire 1 of Face1": SIDES}, LOOPS) == [LOOPS[0]]
+
+
+def test_a_face_is_all_of_its_loops_and_its_border_to_the_next_face_is_none():
+    wires = [SIDES, [circle(50, 30, 10)]]
+    assert geometry.loops_of({"Face1": wires}, LOOPS) == [LOOPS[0], LOOPS[2]]
+    border = [line((-9, 0, 0), (0, 0, 0)), *SIDES[1:]]
+    assert geometry.loops_of({"Face1": [border, wires[1]]}, LOOPS) == [LOOPS[2]]
+    with pytest.raises(geometry.PickError, match="Face1 is on no loop"):
+        geometry.loops_of({"Face1": [border]}, LOOPS)
+
+
+def test_edges_are_open_lines_in_order():
+    names = ["Edge1", "Edge2", "Edge3", "Edge4", "Edge5"]
+    a, b, c, d = CORNERS
+    ends = [(b, c), (b, a), ((9, 9, 9), (9, 9, 5)), (d, c)]
+    assert geometry.chains(names, ends) == [
+        [(1, True), (0, False), (3, True)], [(2, False)]
+    ]  # fmt: skip
+    with pytest.raises(geometry.PickError, match="Edge1, Edge2, Edge3, Edge4 are a whole loop"):
+        geometry.chains(names, [(a, b), (b, c), (c, d), (d, a)])
+    with pytest.raises(geometry.PickError, match="Edge1 are a whole loop"):
+        geometry.chains(names, [(a, a)])
+    with pytest.raises(geometry.PickError, match="Edge1, Edge2, Edge3 meet at one point"):
+        geometry.chains(names, [(a, b), (b, c), (d, b)])
+
+
+def test_lines_are_a_table_that_a_job_reads(tmp_path):
+    down = (0, 0, -1)
+    lines = {"line1": [((0, 0, 3), down), ((10, 0, 3), down)], "line2": [((1e-9, 5, 3), down)] * 1}
+    lines["line2"].append(((0, 95.123456, 3), (0, 0.6, -0.8)))
+    (tmp_path / "lines.csv").write_text(geometry.table(lines))
+    read_back = cad.read(tmp_path / "lines.csv")
+    assert [(loop.name, loop.kind) for loop in read_back.loops] == [
+        ("line1", "open"), ("line2", "open")
+    ]  # fmt: skip
+    contour = read_back.contour("line2", closed=False)
+    np.testing.assert_allclose(contour.points[-1], [0, 0.095123456, 0.003], atol=1e-12)
+    np.testing.assert_allclose(contour.axes[-1], [0, 0.6, -0.8], atol=1e-12)
 
 
 def test_an_edge_of_no_loop_is_refused_by_name():
     with pytest.raises(geometry.PickError, match="Edge7 is on no loop"):
-        geometry.loops_of({"Edge7": [circle(50, 30, 10.5)]}, LOOPS)
+        geometry.loops_of({"Edge7": [[circle(50, 30, 10.5)]]}, LOOPS)
 
 
 def test_all_edges_of_a_loop_are_found_wherever_the_part_is():

@@ -20,8 +20,8 @@ NEEDED = ("freecad", "xvfb-run", "xauth")
 SCREEN = "-screen 0 1600x1000x24 -dpi 96"
 """Other resolutions of the screen make Qt scale the view, and clicks miss."""
 SCENARIOS = (
-    "the_shipped_part", "steps_of_undo", "a_robot_that_is_moved", "a_model_that_changes",
-    "nothing_to_cut", "no_path", "ends", "no_kerfpath",
+    "the_shipped_part", "steps_of_undo", "a_robot_that_is_moved", "faces_and_lines",
+    "a_model_that_changes", "nothing_to_cut", "no_path", "ends", "no_kerfpath",
 )  # fmt: skip
 
 SHOWN = ("picked", "planning", "playing", "fixture", "no-path")

@@ -111,7 +111,7 @@ def _stamps(job: Job) -> list[object]:
     folder, source = job.path.parent, job.source
     cell = source.get("cell", {})
     named = [source["robot"].get(key) for key in ("urdf", "srdf")]
-    named += [cell.get("head", {}).get("file")]
+    named += [source["part"].get("lines"), cell.get("head", {}).get("file")]
     named += [fixture.get("file") for fixture in cell.get("fixture", [])]
     return [_stamp(job.part_file), *(_stamp(folder / name) for name in named if name)]
 

@@ -138,3 +138,23 @@ def test_a_job_cuts_a_tool_path(tmp_path: Path) -> None:
     path.write_text(text.format(more=""))
     with pytest.raises(InputError, match=r"trim\.cls: states no length unit"):
         read_job(path).read_part()
+
+
+def test_a_table_adds_lines_to_the_loops_of_the_drawing(tmp_path: Path) -> None:
+    blank(tmp_path / "blank.dxf", "layer")
+    path, table = tmp_path / "job.toml", tmp_path / "lines.csv"
+    path.write_text(JOB.format(more='lines = "lines.csv"').replace("0/outer", "line1"))
+    with pytest.raises(InputError, match=r"part\.lines: expected a table of points"):
+        read_job(path)
+    rows = ["contour,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z", "line1,0,0,5,0,0,-1"]
+    rows += ["line1,30,0,5,0,0,-1", "line1,30,40,5,0,0,-1"]
+    table.write_text("\n".join(rows))
+    part = read_job(path).read_part()
+    assert [(loop.name, loop.kind) for loop in part.loops] == [
+        ("0/outer", "outer"), ("line1", "open")
+    ]  # fmt: skip
+    assert part.loop("line1").length == pytest.approx(0.07)
+    assert part.contour("line1", closed=False).axes[0].tolist() == [0, 0, -1]
+    table.write_text("\n".join(rows).replace("line1", "0/outer"))
+    with pytest.raises(InputError, match="the drawing has a loop '0/outer', too"):
+        read_job(path).read_part()

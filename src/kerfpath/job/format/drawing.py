@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import EDGE_TURN, GAP, Machine, Part
 from kerfpath.cad import read as read_drawing
+from kerfpath.errors import InputError
 from kerfpath.progress import Progress, no_progress
 
 
@@ -45,6 +46,8 @@ class Drawing:
         The rotary axes of the machine whose program it is, see `kerfpath.cad.read`.
     drawing_frame : "leave_out", "cut" or None
         What to do with a drawing frame in a DXF, see `kerfpath.cad.read`.
+    lines : Path or None
+        A table of points in the part frame, whose contours are loops of the part, too.
     accept_left_out : bool
         Whether geometry that may have to be cut may be left out.
     """
@@ -62,6 +65,7 @@ class Drawing:
     section_at: tuple[float, ...] = ()
     machine: Machine | None = None
     drawing_frame: Literal["leave_out", "cut"] | None = None
+    lines: Path | None = None
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -74,9 +78,9 @@ class Drawing:
         Raises
         ------
         InputError
-            The drawing cannot be read.
+            The drawing or the table of lines cannot be read, or both name a loop alike.
         """
-        return read_drawing(
+        part = read_drawing(
             self.file,
             unit=self.unit,
             gap=self.gap,
@@ -92,3 +96,13 @@ class Drawing:
             drawing_frame=self.drawing_frame,
             progress=progress,
         )
+        if self.lines is None:
+            return part
+        added = read_drawing(self.lines, gap=self.gap)
+        known = {loop.name for loop in part.loops}
+        if both := [loop.name for loop in added.loops if loop.name in known]:
+            raise InputError(
+                f"{self.lines}: the drawing has a loop {both[0]!r}, too; rename the contour"
+            )
+        notes = (f"{self.lines.name}: {note}" for note in added.notes)
+        return replace(part, loops=(*part.loops, *added.loops), notes=(*part.notes, *notes))

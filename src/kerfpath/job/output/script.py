@@ -228,6 +228,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         'between_nodes = "guaranteed" without a proof': assumed
         and job.options.between_nodes == "guaranteed",
         "solids from files in [cell]": job.cell is not None and has_files(job.cell),
+        "lines in [part]": job.drawing.lines is not None,
         "[sequence]": job.sequence is not None,
         "[robot] without model": "model" not in job.source["robot"],
         'start = "best" or direction = "best"': any(len(r.candidates) > 1 for r in requests),

@@ -264,6 +264,11 @@ class PartTable(Table):
         Literal["leave_out", "cut"] | None,
         key("what to do with a rectangle around all else in a DXF", '"leave_out"'),
     ] = None
+    lines: Annotated[
+        Text | None,
+        AfterValidator(existing("a table of points")),
+        key("the path of a table of points with more lines to cut, in the part", '"lines.csv"'),
+    ] = None
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
@@ -318,6 +323,7 @@ class PartTable(Table):
             section_at=tuple(height / 1000 for height in self.section_mm),
             machine=None if self.machine is None else self.machine.machine(),
             drawing_frame=self.drawing_frame,
+            lines=None if self.lines is None else folder / self.lines,
             accept_left_out=self.left_out == "accept",
         )
 

@@ -17,6 +17,7 @@ from .panel import tr
 
 TOOLBAR = [
     "Kerfpath_Cut",
+    "Kerfpath_Line",
     "Kerfpath_Remove",
     "Kerfpath_Fixture",
     "Kerfpath_Plan",
@@ -84,14 +85,14 @@ installation = None
 
 
 def picked():
-    """Return the object whose edges or faces are selected, and the edges by what is picked.
+    """Return the object whose edges or faces are selected, and their names.
 
     Raises
     ------
     PickError
         Nothing of the kind is selected, or parts of several objects are.
     """
-    found, groups = [], {}
+    found, picks = [], []
     for each in Gui.Selection.getSelectionEx():
         if isinstance(getattr(each.Object, "Proxy", None), objects.Contour):
             continue
@@ -100,15 +101,7 @@ def picked():
         if not names:
             continue
         found.append(each.Object)
-        edges, shape = objects.edges_of(each.Object), each.Object.Shape.copy()
-        shape.Placement = App.Placement()
-        for name in names:
-            number = int(name[4:]) - 1
-            if name.startswith("Edge"):
-                groups[name] = [edges[number]]
-            else:
-                for i, wire in enumerate(shape.Faces[number].Wires):
-                    groups["wire {} of {}".format(i + 1, name)] = wire.Edges
+        picks += names
     if not found:
         raise geometry.PickError(
             tr("nothing to cut is picked: pick edges or faces of the part first")
@@ -116,7 +109,19 @@ def picked():
     if len(found) > 1:
         labels = " and ".join(each.Label for each in found)
         raise geometry.PickError(tr("edges of one part are cut at a time, got those of ") + labels)
-    return found[0], groups
+    return found[0], picks
+
+
+def groups_of(part, names):
+    """Return edges and faces of an object as `geometry.loops_of` takes them."""
+    shape, groups = objects.own_shape(part), {}
+    for name in names:
+        number = int(name[4:]) - 1
+        if name.startswith("Edge"):
+            groups[name] = [[shape.Edges[number]]]
+        else:
+            groups[name] = [wire.Edges for wire in shape.Faces[number].Wires]
+    return groups
 
 
 def contours_picked():
@@ -183,7 +188,12 @@ class Cut(_Command):
     TIP = "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
 
     def run(self):
-        part, groups = picked()
+        part, names = picked()
+        groups = groups_of(part, names)
+        self.begin(part, lambda at_work: at_work.cut(groups))
+
+    def begin(self, part, cut):
+        """Call `cut` with the session of the part."""
         job = session.job_of(part.Document)
         if job is not None and job.Part != part:
             raise geometry.PickError(
@@ -194,7 +204,19 @@ class Cut(_Command):
         found = _at_work(part.Document, part)
         if found is not None:
             found.problem = ""
-            found.cut(groups)
+            cut(found)
+
+
+class Line(Cut):
+    """Open lines of the picked edges."""
+
+    NAME, MENU, KEYS = "line", "Cut these edges only", "K, L"
+    TIP = "Cut the picked edges from end to end; a face that is picked, too, says from which side"
+
+    def run(self):
+        part, names = picked()
+        lines = objects.lines_in(part, names)
+        self.begin(part, lambda at_work: at_work.cut_lines(lines))
 
 
 class Remove(_Command):
@@ -265,7 +287,7 @@ class Program(_Command):
 
 def add_commands():
     """Add the commands to FreeCAD."""
-    for command in (Cut, Remove, Fixture, Plan, Program):
+    for command in (Cut, Line, Remove, Fixture, Plan, Program):
         Gui.addCommand("Kerfpath_" + command.__name__, command())
 
 

@@ -102,6 +102,71 @@ def found_again(names, prints, edges):
 
 
 # -----------------------------------------------------------------------------
+# Open lines of edges.
+
+
+def chains(names, ends):
+    """Return the open lines that edges make up, as lists of (index, whether it runs backwards).
+
+    Parameters
+    ----------
+    names : list of str
+    ends : list of (first, last)
+        The ends of each edge, mm.
+
+    Raises
+    ------
+    PickError
+        Edges branch, or make up a whole loop.
+    """
+
+    def at(point, among):
+        return [
+            (i, bool(end)) for i in among for end in (0, 1) if math.dist(ends[i][end], point) < NEAR
+        ]
+
+    every = range(len(ends))
+    for i in every:
+        for point in ends[i]:
+            if len(at(point, every)) > 2:
+                beside = sorted({names[k] for k, _ in at(point, every)})
+                raise PickError("{} meet at one point; cut one line at a time".format(
+                    ", ".join(beside)))  # fmt: skip
+    found, left = [], list(every)
+    while left:
+        free = [(i, bool(end)) for i in left for end in (0, 1) if len(at(ends[i][end], every)) == 1]
+        if not free:
+            raise PickError(
+                "{} are a whole loop; take Cut what is picked".format(
+                    ", ".join(names[i] for i in left)
+                )
+            )
+        line, step = [], free[0]
+        while step is not None:
+            i, backwards = step
+            line.append(step)
+            left.remove(i)
+            step = next(iter(at(ends[i][0 if backwards else 1], left)), None)
+        found.append(line)
+    return found
+
+
+def table(lines):
+    """Return open lines as a table of points and tool axes, for the key `lines` of a job.
+
+    Parameters
+    ----------
+    lines : dict of str to list of (point, axis)
+        Points (mm) and tool axes of each line, by its name.
+    """
+    rows = ["contour,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z"]
+    for name, line in lines.items():
+        for point, axis in line:
+            rows.append(",".join([name, *("{:.9g}".format(x) for x in (*point, *axis))]))
+    return "\n".join(rows) + "\n"
+
+
+# -----------------------------------------------------------------------------
 # The loops that edges are on.
 
 
@@ -182,8 +247,9 @@ def loops_of(groups, loops):
 
     Parameters
     ----------
-    groups : dict of str to list of edges
-        What is picked, by its name: an edge alone, or all edges of a wire.
+    groups : dict of str to list of lists of edges
+        What is picked, by its name: an edge alone, or the edges of each wire of a face, of which
+        those that are no loop are left out, as where a face goes on in the next one.
     loops : list of Loop
 
     Raises
@@ -192,16 +258,19 @@ def loops_of(groups, loops):
         Something picked is on no loop, or on several that are equally likely.
     """
     on = {}
-    for name, edges in groups.items():
-        points = [samples(edge) for edge in edges]
-        on[name] = [loop for loop in loops if all(map(loop.has, points))]
-        if not on[name]:
+    for name, wires in groups.items():
+        found = []
+        for edges in wires:
+            points = [samples(edge) for edge in edges]
+            found.append([loop for loop in loops if all(map(loop.has, points))])
+        if not any(found):
             raise PickError(
                 "{} is on no loop that can be cut from outside; pick an edge of the outer side "
                 "of the part".format(name)
             )
+        on.update(((name, i), each) for i, each in enumerate(found) if each)
     picked = {}
-    for name, candidates in on.items():
+    for (name, _), candidates in on.items():
         # A loop with more of what is picked comes first, and the rim of a hole before its wall.
         def rank(loop):
             return sum(loop in others for others in on.values()), loop.kind == "inner"

@@ -87,7 +87,10 @@ class JobView(_View):
 
 
 class Contour(_Proxy):
-    """A loop of the part that is cut: its edges by name, with a fingerprint of each."""
+    """A loop or an open line that is cut: its edges by name, with a fingerprint of each.
+
+    The fingerprints of a line also have the normal of the side that it is on.
+    """
 
     PROPERTIES = (
         ("App::PropertyLinkSubGlobal", "Edges", "The edges of the loop"),
@@ -109,7 +112,8 @@ class Contour(_Proxy):
             raise ValueError(obj.Problem)
         source, _ = obj.Edges
         names = names_of(obj)
-        edges, prints, problem = edges_of(source), json.loads(obj.Fingerprints), ""
+        own, prints, problem = own_shape(source), json.loads(obj.Fingerprints), ""
+        edges = own.Edges
         try:
             found = geometry.found_again(names, prints, edges)
             if found != names:
@@ -117,6 +121,8 @@ class Contour(_Proxy):
                     "{}: {} is now {}\n".format(obj.Label, ", ".join(names), ", ".join(found))
                 )
                 obj.Edges = (source, found)
+            if is_line(obj):
+                line_of(own, found, normals_of(obj))
             shape = Part.Compound([edges[int(name[4:]) - 1] for name in found])
             shape.Placement = source.getGlobalPlacement()
             obj.Shape = shape
@@ -129,10 +135,12 @@ class Contour(_Proxy):
         if problem:
             raise ValueError("{}: {}".format(obj.Label, problem))
 
-    def pick(self, obj, source, names, loop):
-        """Take the edges of a loop of an object."""
+    def pick(self, obj, source, names, loop, normals=None):
+        """Take the edges of a loop of an object, or of a line on the side with these normals."""
         edges = edges_of(source)
         prints = [geometry.fingerprint(edges[int(name[4:]) - 1]) for name in names]
+        for each, normal in zip(prints, normals or ()):
+            each["normal"] = normal
         obj.Edges, obj.Fingerprints, obj.Loop = (source, names), json.dumps(prints), loop
 
 
@@ -154,16 +162,129 @@ class ContourView(_View):
         return False
 
 
-def edges_of(source):
-    """Return the edges of an object in its own coordinates, wherever it is placed."""
+def own_shape(source):
+    """Return the shape of an object in its own coordinates, wherever it is placed."""
     shape = source.Shape.copy()
     shape.Placement = App.Placement()
-    return shape.Edges
+    return shape
+
+
+def edges_of(source):
+    """Return the edges of an object in its own coordinates."""
+    return own_shape(source).Edges
 
 
 def names_of(contour):
     """Return the names of a contour's edges, without what newer versions put before them."""
     return [name.rsplit(".", 1)[-1].lstrip("?") for name in contour.Edges[1]]
+
+
+# -----------------------------------------------------------------------------
+# Open lines: edges with the faces from whose side they are cut.
+
+STEP, DEFLECTION, SQUARE = 1.0, 0.005, 0.999
+"""mm between points of a line and of its chords from the edge, and the least cosine between the
+normals of a side before and after a change of the model."""
+
+
+def is_line(contour):
+    """Return whether a contour is an open line."""
+    return '"normal"' in contour.Fingerprints
+
+
+def normals_of(contour):
+    """Return the normals of the side of an open line, one for each edge."""
+    return [each["normal"] for each in json.loads(contour.Fingerprints)]
+
+
+def lines_in(source, names):
+    """Return the open lines that picked edges make up, as (names of edges, normals of the side).
+
+    Parameters
+    ----------
+    source : object
+    names : list of str
+        Edges, and faces on whose side they are cut.
+
+    Raises
+    ------
+    PickError
+        No edges are picked, they are no open lines, or their side is not clear.
+    """
+    shape = own_shape(source)
+    edges = [name for name in names if name.startswith("Edge")]
+    sides = [shape.Faces[int(name[4:]) - 1] for name in names if name.startswith("Face")]
+    if not edges:
+        raise geometry.PickError("no edge is picked: pick the edges of the line first")
+    every = [shape.Edges[int(name[4:]) - 1] for name in edges]
+    found = []
+    for line in geometry.chains(edges, [_ends(edge) for edge in every]):
+        along = [every[i] for i, _ in line]
+        beside = [shape.ancestorsOfType(edge, Part.Face) for edge in along]
+        common = sides or [f for f in beside[0] if all(_among(f, each) for each in beside)]
+        chosen = [[f for f in each if _among(f, common)] for each in beside]
+        if any(len(each) != 1 for each in chosen) or not (sides or len(common) == 1):
+            raise geometry.PickError(
+                "{}: its side is not clear; pick the face from whose side it is cut, too, with "
+                "Control held".format(", ".join(edges[i] for i, _ in line))
+            )
+        normals = [
+            [round(x, 6) for x in _normal(face, _middle(edge))]
+            for edge, (face,) in zip(along, chosen)
+        ]
+        found.append(([edges[i] for i, _ in line], normals))
+    return found
+
+
+def line_of(shape, names, normals):
+    """Return points (mm) and tool axes of an open line of a shape.
+
+    Raises
+    ------
+    PickError
+        An edge has no face any more with the normal of its side.
+    """
+    every = [shape.Edges[int(name[4:]) - 1] for name in names]
+    (line,) = geometry.chains(names, [_ends(edge) for edge in every])
+    found = []
+    for i, backwards in line:
+        edge, normal, middle = every[i], App.Vector(*normals[i]), _middle(every[i])
+        beside = shape.ancestorsOfType(edge, Part.Face)
+        alike = [face for face in beside if _normal(face, middle).dot(normal) > SQUARE]
+        if len(alike) != 1:
+            raise geometry.PickError(
+                "the model has changed: the face on whose side {} is cut is another one; pick the "
+                "line again".format(names[i])
+            )
+        points = _points(edge)
+        rows = [(tuple(p), tuple(-x for x in _normal(alike[0], p))) for p in points]
+        rows = rows[::-1] if backwards else rows
+        found += rows[1:] if found else rows
+    return found
+
+
+def _points(edge):
+    """Return points of an edge, so close that chords hardly leave it."""
+    fine = 2 * len(edge.discretize(Deflection=DEFLECTION))
+    return edge.discretize(Number=max(fine, int(edge.Length / STEP)) + 1)
+
+
+def _ends(edge):
+    points = edge.discretize(Number=3)
+    return tuple(points[0]), tuple(points[-1])
+
+
+def _middle(edge):
+    return edge.discretize(Number=3)[1]
+
+
+def _normal(face, point):
+    u, v = face.Surface.parameter(point)
+    return face.normalAt(u, v)
+
+
+def _among(face, faces):
+    return any(face.isSame(each) for each in faces)
 
 
 # -----------------------------------------------------------------------------
@@ -268,12 +389,12 @@ def make_job(document, part):
     return job
 
 
-def make_contour(job, names, loop, label):
-    """Return a new contour of a job: edges of its part."""
+def make_contour(job, names, loop, label, normals=None):
+    """Return a new contour of a job: edges of its part; `normals` are of a line."""
     contour = job.Document.addObject("Part::FeaturePython", "Contour")
     Contour(contour)
     ContourView(contour.ViewObject)
     contour.Label = label
-    contour.Proxy.pick(contour, job.Part, names, loop)
+    contour.Proxy.pick(contour, job.Part, names, loop, normals)
     job.Contours = [*job.Contours, contour]
     return contour

@@ -22,7 +22,7 @@ FOREIGN = ("PYTHON", "LD_LIBRARY_PATH", "QT_", "SSL_CERT", "FONTCONFIG_")
 """Beginnings of the variables by which FreeCAD would lead another Python astray."""
 LAST_LINES = 30
 """Lines of the errors of a process that a message may quote from."""
-START = 90.0
+START = 300.0
 """s: the longest time in which a process says where it listens; the first start compiles."""
 QUIET = {"creationflags": 0x08000000} if sys.platform == "win32" else {}
 """On Windows: no console window."""
@@ -275,7 +275,7 @@ class Studio:
 
     def _listen(self):
         why = None
-        timer = threading.Timer(START, self._process.kill)
+        timer = threading.Timer(START, self._give_up)
         timer.daemon = True
         timer.start()
         try:
@@ -302,6 +302,10 @@ class Studio:
             why = self._last_words()
         self._process.kill()
         self._heard.put({"type": "ended", "message": why})
+
+    def _give_up(self):
+        self._said.append("error: it did not start within {:g} s".format(START))
+        self._process.kill()
 
     def _last_words(self):
         text = " ".join(self._said)

@@ -126,6 +126,7 @@ class Session(QtCore.QObject):
         self.t, self.playing, self.timeline = 0.0, False, motion.Timeline(None, [])
         self.moved, self.studio, self._folder = 0.0, None, None
         self._label, self._pending, self._picks, self._cut = "", None, None, set()
+        self._new_lines = {}  # names of edges and normals, until they are contours
         self._loops, self._meshes, self._export, self.exported = [], {}, None, []
         self._timer = QtCore.QTimer(self)
         self._timer.timeout.connect(self._tick)
@@ -146,6 +147,7 @@ class Session(QtCore.QObject):
         if self.job is not None:
             for each in self.job.Fixtures:
                 self._written(each)
+            lines = self._lines_written()
             path = os.path.join(self._folder, self._job_name())
             _write(path, self.job.Job.encode())
         self.progress = {"busy": True, "label": "starting kerfpath", "done": 0, "total": 0}
@@ -154,8 +156,12 @@ class Session(QtCore.QObject):
         except ProcessError:
             self._end()
             raise
-        if self.job is not None and '"{}"'.format(drawing) not in self.job.Job:
-            self.edit("drawing", [(["part", "file"], drawing)])
+        if self.job is not None:
+            names = {"file": drawing, "lines": lines}
+            self.edit("drawing", [
+                (["part", key], name) for key, name in names.items()
+                if name and '"{}"'.format(name) not in self.job.Job
+            ])  # fmt: skip
         self._timer.start(TICK)
         self.heard.emit("progress")
 
@@ -205,6 +211,22 @@ class Session(QtCore.QObject):
         """Make contours of what is picked: edges by name, see `geometry.loops_of`."""
         self._picks = groups
         self._resolve()
+
+    def cut_lines(self, lines):
+        """Make open lines of edges: `lines` as `objects.lines_in` returns them."""
+        contours = self.job.Contours if self.job is not None else []
+        cut = [sorted(objects.names_of(each)) for each in contours if objects.is_line(each)]
+        taken = {each.Loop for each in contours}
+        self._new_lines = {}
+        for names, normals in lines:
+            if sorted(names) in cut:
+                self._say("{} is already cut".format(", ".join(names)))
+                continue
+            name = next(n for n in map("line{}".format, range(1, 10**6)) if n not in taken)
+            taken.add(name)
+            self._new_lines[name] = names, normals
+        if self._new_lines:
+            self.edit("drawing", [(["part", "lines"], self._lines_written())])
 
     def remove(self, contours):
         """Take contours out of the job."""
@@ -365,9 +387,11 @@ class Session(QtCore.QObject):
             return
         if self.moved and time.monotonic() - self.moved > QUIET and self._pending is None:
             self.moved = 0.0
-            drawing = self._written(self.part)
-            if self.value("part.file") not in (None, drawing):
-                self.edit("drawing", [(["part", "file"], drawing)])
+            names = {"file": self._written(self.part), "lines": self._lines_written()}
+            self.edit("drawing", [
+                (["part", key], name) for key, name in names.items()
+                if name and self.value("part." + key) not in (None, name)
+            ])  # fmt: skip
             self._send_places()
 
     def _take_ended(self, message):
@@ -393,8 +417,7 @@ class Session(QtCore.QObject):
         self.values, self.given = message["values"], message["given"]
         self.faults = [fault["message"] for fault in message["faults"]]
         if self.job is None:
-            picks = {table.get("pick") for table in (self.values or {}).get("contour", [])}
-            if self._cut and picks == self._cut:
+            if self._cut and self._asked() == self._cut:
                 self._make()
         elif message["text"] != self.job.Job:
             self._apply()
@@ -409,6 +432,14 @@ class Session(QtCore.QObject):
         self._loops = [geometry.Loop(each, message["T"]) for each in closed]
         self._rename()
         self._resolve()
+        lines = set(self._new_lines)
+        if lines and lines <= {each["name"] for each in message["loops"]} - self._asked():
+            self._label, self._cut = "Cut", lines
+            self.ask("cut", loops=sorted(lines), alone=self.job is None)
+
+    def _asked(self):
+        """Return the loops that the job cuts."""
+        return {table.get("pick") for table in (self.values or {}).get("contour", [])}
 
     def _take_scene(self, message):
         self.scene = message
@@ -456,10 +487,11 @@ class Session(QtCore.QObject):
         folder = self.export_folder()
         files = {each["name"]: each["text"].encode() for each in message["files"]}
         fixtures = (self.values.get("cell") or {}).get("fixture") or []
-        for table in (self.values["part"], *fixtures):
-            if table.get("file"):
-                with open(os.path.join(self._folder, table["file"]), "rb") as file:
-                    files[table["file"]] = file.read()
+        tables = (self.values["part"], *fixtures)
+        for name in [table.get(key) for table in tables for key in ("file", "lines")]:
+            if name:
+                with open(os.path.join(self._folder, name), "rb") as file:
+                    files[name] = file.read()
         files[self._job_name()] = self.text.encode()
         try:
             for name, content in files.items():
@@ -508,9 +540,11 @@ class Session(QtCore.QObject):
             return
         tables, changes, edges = self.values["contour"], [], objects.edges_of(self.part)
         for contour in self.job.Contours:
+            if objects.is_line(contour):
+                continue
             index = next((i for i, t in enumerate(tables) if t.get("pick") == contour.Loop), None)
             names = objects.names_of(contour)
-            group = {contour.Label: [edges[int(name[4:]) - 1] for name in names]}
+            group = {contour.Label: [[edges[int(name[4:]) - 1] for name in names]]}
             (loop,) = geometry.loops_of(group, self._loops)
             if index is not None and loop.name != contour.Loop:
                 changes.append((["contour", index, "pick"], loop.name))
@@ -547,9 +581,13 @@ class Session(QtCore.QObject):
         known = {each.Loop for each in self.job.Contours}
         edges = objects.edges_of(self.part)
         for name, index in wanted.items():
-            if name not in known:
+            if name in known:
+                continue
+            on, normals = self._new_lines.pop(name, (None, None))
+            if on is None:
                 on = geometry.edges_on(self._loop(name), edges)
-                objects.make_contour(self.job, on, name, tables[index].get("name") or name)
+            label = tables[index].get("name") or name
+            objects.make_contour(self.job, on, name, label, normals)
 
     @contextmanager
     def _transaction(self, name):
@@ -621,6 +659,31 @@ class Session(QtCore.QObject):
             shape.Placement = App.Placement()
             shape.exportStep(os.path.join(self._folder, name))
             self._files[obj.Name] = now, name, number
+        return name
+
+    def _lines_written(self):
+        """Return the name of the file with the open lines; other lines have a new file.
+
+        It is None without lines, and that of the job where one of them is lost.
+        """
+        contours = self.job.Contours if self.job is not None else []
+        lines = {
+            each.Loop: (objects.names_of(each), objects.normals_of(each))
+            for each in contours
+            if objects.is_line(each)
+        }
+        lines.update(self._new_lines)
+        if not lines or self.lost():
+            return self.value("part.lines")
+        shape = objects.own_shape(self.part)
+        text = geometry.table({n: objects.line_of(shape, *each) for n, each in lines.items()})
+        before, name, number = self._files.get("", (None, "", 0))
+        if text != before:
+            number += 1
+            ending = "-{}".format(number) if number > 1 else ""
+            name = "{}-lines{}.csv".format(_safe(self.part.Label), ending)
+            _write(os.path.join(self._folder, name), text.encode())
+            self._files[""] = text, name, number
         return name
 
     # The robot in the view.
