@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from kerfpath.certificate import Certify as Certify
     from kerfpath.comfort import Band as Band
     from kerfpath.comfort import Comfort as Comfort
+    from kerfpath.comfort import Reversals as Reversals
     from kerfpath.contour import Contour as Contour
     from kerfpath.contour import join as join
     from kerfpath.errors import AuditFailed as AuditFailed
@@ -67,6 +68,7 @@ _HOME = {
     "PlanOptions": "options",
     "Refinement": "refiner",
     "Response": "execution",
+    "Reversals": "comfort",
     "Robot": "robots",
     "Target": "execution",
     "Tilt": "tilt",

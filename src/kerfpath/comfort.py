@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +48,18 @@ from kerfpath.kernels.turns import JointLimits
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots import Robot
 
-__all__ = ["MEASURES", "Band", "BandData", "Comfort", "Measure", "jacobian", "measure", "measures"]
+__all__ = [
+    "MEASURES",
+    "Band",
+    "BandData",
+    "Comfort",
+    "Measure",
+    "Reversals",
+    "ReversalsData",
+    "jacobian",
+    "measure",
+    "measures",
+]
 
 AT_ONCE = 100_000
 """Jacobians computed at a time: many enough to hide the overhead, few enough for the memory."""
@@ -81,6 +92,13 @@ class BandData(TypedDict):
     margin: float
     width: float
     cost: float
+
+
+class ReversalsData(TypedDict):
+    """A `Reversals` as JSON data."""
+
+    cost: float
+    joints: list[int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +139,56 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Reversals:
+    """The cost of joints that turn back under way, where backlash and friction mark the cut.
+
+    Parameters
+    ----------
+    cost : float
+        Cost of each reversal of each joint, in the unit of the objective: with the default weights,
+        a joint at full speed from node to node costs 1.
+    joints : sequence of int
+        The joints that count, from 1; default: those that place the wrist centre.
+
+    Raises
+    ------
+    InputError
+        A negative cost, or joints that are not different whole numbers from 1.
+    """
+
+    cost: float
+    joints: tuple[int, ...] = (1, 2, 3)
+
+    def __post_init__(self) -> None:
+        cost = not_negative(self.cost, "comfort reversals cost")
+        object.__setattr__(self, "cost", cost)
+        joints = np.asarray(self.joints)
+        whole = joints.ndim == 1 and joints.size > 0 and np.issubdtype(joints.dtype, np.integer)
+        if not whole or joints.min() < 1 or len(np.unique(joints)) < len(joints):
+            raise InputError(
+                f"comfort reversals joints: expected different numbers from 1, got {self.joints!r}"
+            )
+        object.__setattr__(self, "joints", tuple(joints.tolist()))
+
+    def per_joint(self, robot: Robot) -> Array:
+        """Return the cost (n,) of a reversal of each joint of a robot.
+
+        Raises
+        ------
+        InputError
+            The robot has no such joint.
+        """
+        if max(self.joints) > robot.joints:
+            raise InputError(
+                f"comfort reversals joints: expected joints from 1 to {robot.joints}, got "
+                f"{max(self.joints)}"
+            )
+        price = np.zeros(robot.joints)
+        price[np.array(self.joints) - 1] = self.cost
+        return freeze(price)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Comfort:
     """Margins and bands of a plan, one for each measure; None: the measure does not matter.
 
@@ -131,11 +199,13 @@ class Comfort:
     manipulability : Band m^3, optional
     clearance : Band m, optional
         Band beyond the near-miss distances of a cell, which are the hard margin; without a margin.
+    reversals : Reversals, optional
+        Cost of joints that turn back.
 
     Raises
     ------
     InputError
-        A margin that no joint vector keeps, a margin of clearance, or a value that is no Band.
+        A margin that no joint vector keeps, a margin of clearance, or a value of another type.
     """
 
     wrist: Band | None = None
@@ -144,14 +214,15 @@ class Comfort:
     limits: Band | None = None
     manipulability: Band | None = None
     clearance: Band | None = None
+    reversals: Reversals | None = None
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in (each.name for each in fields(self)):
-            band = getattr(self, name)
-            if not (band is None or isinstance(band, Band)):
-                raise InputError(f"comfort {name}: expected a Band, got {band!r}")
+            value, kind = getattr(self, name), Reversals if name == "reversals" else Band
+            if not (value is None or isinstance(value, kind)):
+                raise InputError(f"comfort {name}: expected a {kind.__name__}, got {value!r}")
         for name, band in self.bands.items():
             if band.margin >= MEASURES[name].most:
                 raise InputError(
@@ -164,14 +235,17 @@ class Comfort:
                 "margin there, and only width and cost here"
             )
 
-    def to_data(self) -> dict[str, BandData]:
-        """Return the bands as JSON data, which `from_data` reads."""
-        return {name: band for name, band in asdict(self).items() if band is not None}
+    def to_data(self) -> dict[str, BandData | ReversalsData]:
+        """Return bands and reversals as JSON data, which `from_data` reads."""
+        return {name: each for name, each in asdict(self).items() if each is not None}
 
     @classmethod
-    def from_data(cls, data: Mapping[str, BandData]) -> Comfort:
-        """Return the bands that `to_data` wrote."""
-        return cls(**{name: Band(**band) for name, band in data.items()})
+    def from_data(cls, data: Mapping[str, BandData | ReversalsData]) -> Comfort:
+        """Return the bands and reversals that `to_data` wrote."""
+        made: dict[str, Any] = {}
+        for name, each in data.items():
+            made[name] = (Reversals if name == "reversals" else Band)(**each)
+        return cls(**made)
 
     @property
     def bands(self) -> dict[str, Band]:
@@ -180,8 +254,14 @@ class Comfort:
 
     @property
     def costs(self) -> bool:
-        """Whether any band has a cost."""
-        return any(b.cost for b in (*self.bands.values(), *filter(None, [self.clearance])))
+        """Whether anything has a cost."""
+        bands = (*self.bands.values(), *filter(None, [self.clearance]))
+        return self.prices_reversals or any(band.cost for band in bands)
+
+    @property
+    def prices_reversals(self) -> bool:
+        """Whether reversals cost; the cost depends on two steps, not on a node."""
+        return self.reversals is not None and self.reversals.cost > 0
 
     @property
     def prices_clearance(self) -> bool:
@@ -191,7 +271,10 @@ class Comfort:
     @property
     def hard(self) -> Comfort:
         """The margins alone, without costs."""
-        return Comfort(**{name: Band(margin=band.margin) for name, band in self.bands.items()})
+        bands: dict[str, Any] = {}
+        for name, band in self.bands.items():
+            bands[name] = Band(margin=band.margin)
+        return Comfort(**bands)
 
     def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[Reason, Bools]:
         """Return which of joint vectors q (B, n) rad break each hard margin, (B,) by reason.

@@ -402,6 +402,13 @@ class PlanOptions(Settings):
             comfort=None if self.comfort is None else self.comfort.hard,
         )
 
+    @property
+    def without_reversals(self) -> PlanOptions:
+        """The options without the cost of reversals; themselves if there is none."""
+        if self.comfort is None or not self.comfort.prices_reversals:
+            return self
+        return replace(self, comfort=replace(self.comfort, reversals=None))
+
 
 def with_keywords(
     options: PlanOptions | None, keywords: Mapping[str, Any], allowed: type, **more: Any
@@ -434,8 +441,8 @@ EXACT_OR_BETTER = ("continuous", "exact")
 """Methods whose paths keep (5) and (6)."""
 GIVEN = object()
 """In a rule: any value except None."""
-CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
-"""Names under which the rules test two facts of comfort, beside the options themselves."""
+CLEARANCE, PENALTIES, REVERSALS = "comfort clearance", "comfort costs", "comfort reversals"
+"""Names under which the rules test facts of comfort, beside the options themselves."""
 _ONE_WAY: dict[str, object] = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
 _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
@@ -453,6 +460,15 @@ _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     ({"between_nodes": "guaranteed", "method": "exact"}, {"refine": True}),
     ({"least_piece": GIVEN}, {"interruptions": "fewest"}),
     ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
+    (
+        {REVERSALS: True},
+        {
+            "method": EXACT_OR_BETTER,
+            "objective": "sum",
+            "feed": "constant",
+            "interruptions": "none",
+        },
+    ),
     ({"feed": "dip", PENALTIES: True}, {"refine": False}),
 )
 """Pairs of options and values: if all of the first hold, those of the second must hold."""
@@ -463,6 +479,7 @@ def _require_no_conflict(options: PlanOptions) -> None:
     facts = {field.name: getattr(options, field.name) for field in fields(options)}
     facts[CLEARANCE] = None if comfort is None else comfort.clearance
     facts[PENALTIES] = comfort is not None and comfort.costs
+    facts[REVERSALS] = comfort is not None and comfort.prices_reversals
     if options.rotation is not None and not np.isfinite(options.rotation).any():
         facts["rotation"] = None
     for beside, needed in _RULES:

@@ -277,6 +277,7 @@ def cut_entry(cut: CutResult) -> dict[str, object]:
         "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
+        "reversals": int(criteria.reversals.sum()),
         "as_run": _as_run_entry(cut.as_run),
         "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run.checks) if not c.ok],
     }

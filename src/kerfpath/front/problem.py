@@ -149,9 +149,9 @@ class Subproblem:
         )
 
     def applied_to(self, options: PlanOptions) -> PlanOptions:
-        """Return the options with the settings of this subproblem."""
+        """Return the options with the settings of this subproblem, without costs of reversals."""
         return replace(
-            options,
+            options.without_reversals,
             method="continuous" if self.continuous else "exact",
             objective=self.objective,
             metric=self.metric,

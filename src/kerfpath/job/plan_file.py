@@ -168,6 +168,7 @@ class CriteriaData(TypedDict):
     external_range: NotRequired[Row]
     peak_velocity_share: Row
     peak_acceleration_share: Row
+    reversals: NotRequired[list[int]]
     nearest: dict[str, NearestData]
 
 
@@ -1156,6 +1157,7 @@ def plan_entry(
             **apart("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
+            "reversals": criteria.reversals.tolist(),
             "nearest": {
                 name: {"least": least if np.isfinite(least) else None, "unit": MEASURES[name].unit}
                 | {"node": node}

@@ -6,9 +6,10 @@ neighbouring states, and the recursion
 
     d(p, j) = rho(p, j) + min over l of d(l, p), with (6) for l, p, j
 
-is exact. Torques at p are functions of the same two states, see `kerfpath.kernels.torque`. The
-first-order problem solved backwards gives a bound h(j) on the cost to come: given a bound on the
-cost, only states with d + h within it are kept.
+is exact. Torques at p are functions of the same two states, see `kerfpath.kernels.torque`. Where
+joints that turn back have a price, which is added to d, a state also has the direction in which
+each of them moved last. The first-order problem solved backwards gives a bound h(j) on the cost to
+come: given a bound on the cost, only states with d + h within it are kept.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from kerfpath.kernels.limits import (
 from kerfpath.kernels.reach import fill_candidates
 from kerfpath.kernels.search import (
     Aim,
+    ReversalPrices,
     SortedLayers,
     combined,
     distance,
@@ -92,7 +94,8 @@ def _begin(
             lowest = min(lowest, f)
         first[i + 1] = count
     none = np.empty((count, len(layers.endless)))
-    return States(vertex[:count], d[:count], none, np.full(count, -1), first), lowest
+    parent, way = np.full(count, -1), np.zeros(count, np.int64)
+    return States(vertex[:count], d[:count], none, parent, way, first), lowest
 
 
 @jit_inline
@@ -107,6 +110,24 @@ def _breaks(
     if acceleration_excess(dq, dq_before, change) >= 0:
         return True
     return torque_excess(aim.torque, layers.given, p, dq_before, dq, room) >= 0
+
+
+@jit_inline
+def _turned(reversals: ReversalPrices, way: int, dq: Array) -> tuple[int, float]:
+    """Directions of the joints after the increment dq (n,), and the price of those that turn back.
+
+    `way` is the directions before, a digit of base 3 for each joint: 0 if it has not moved yet, 1
+    up, 2 down. A joint that is still keeps its direction.
+    """
+    price, unit = 0.0, 1
+    for i in range(len(dq)):
+        if reversals.price[i] > 0.0 and abs(dq[i]) > reversals.still:
+            before, after = way // unit % 3, 1 if dq[i] > 0.0 else 2
+            if before not in (0, after):
+                price += reversals.price[i]
+            way += (after - before) * unit
+        unit *= 3
+    return way, price
 
 
 @jit_inline
@@ -195,8 +216,47 @@ def _add_leaps(
     for v in range(b - a):
         lowest = min(lowest, f[v]) if f[v] > bound else lowest
     none = np.zeros((m, states.dq.shape[1]))
-    more = States(leapt, d + layers.cost[leapt], none, np.full(m, LEAPT), states.first)
+    parent, way = np.full(m, LEAPT), np.zeros(m, np.int64)
+    more = States(leapt, d + layers.cost[leapt], none, parent, way, states.first)
     return group_by_vertex(joined_states(states, more), a, b, width), lowest
+
+
+@jit_inline
+def _fill_ways(
+    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int, j: int, step: float,
+    dq: Array, rest: float, bound: float, count: int, scratch: Scratch, out: States,
+) -> tuple[int, float]:  # fmt: skip
+    """Append the states of the edge from p to j where joints that turn back at p have a price.
+
+    There is one for each way in which joints that stand still along the edge moved before. Returns
+    the count, -1 if there is no room, and the least cost dropped.
+    """
+    begin, lowest = count, np.inf
+    for s in range(a, b):
+        d = states.d[s] + step
+        if d + rest > bound:
+            lowest = min(lowest, d + rest)
+            break
+        if states.parent[s] >= 0 and _breaks(
+            layers, aim, p, states.dq[s], dq, scratch.change, scratch.torque
+        ):
+            continue
+        way, price = _turned(aim.reversals, states.way[s], dq)
+        d += price
+        if d + rest > bound:
+            lowest = min(lowest, d + rest)
+            continue
+        at = begin
+        while at < count and out.way[at] != way:
+            at += 1
+        if at == len(out.vertex):
+            return -1, lowest
+        if at == count or d < out.d[at]:
+            out.vertex[at], out.parent[at], out.d[at], out.way[at] = j, s, d, way
+            for x in range(len(dq)):
+                out.dq[at, x] = dq[x]
+            count = max(count, at + 1)
+    return count, lowest
 
 
 @jit_inline
@@ -204,7 +264,10 @@ def _fill_from(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     i: int, count: int, scratch: Scratch, out: States,
 ) -> tuple[int, float]:  # fmt: skip
-    """Append the states that leave vertex i of layer k; return the count and least cost dropped."""
+    """Append the states that leave vertex i of layer k; return the count and least cost dropped.
+
+    The count is -1 if there is no room for them.
+    """
     a, b, p, lowest = states.first[i], states.first[i + 1], layers.start[k] + i, np.inf
     if a == b:
         return count, lowest
@@ -230,12 +293,20 @@ def _fill_from(
             fill_change_at(layers, aim, j, scratch.seam)
             if _breaks(layers, aim, j, dq, seam, scratch.seam, scratch.torque):
                 continue
+        if len(aim.reversals.price) > 0:
+            count, dropped = _fill_ways(
+                layers, aim, states, a, b, p, j, step, dq, h[j], bound, count, scratch, out
+            )
+            lowest = min(lowest, dropped)
+            if count < 0:
+                return count, lowest
+            continue
         s, cost, dropped = _predecessor(
             layers, aim, states, a, b, p, step, dq, h[j], bound, scratch.change, scratch.torque
         )
         lowest = min(lowest, dropped)
         if s >= 0:
-            out.vertex[count], out.parent[count], out.d[count] = j, s, cost
+            out.vertex[count], out.parent[count], out.d[count], out.way[count] = j, s, cost, 0
             for x in range(len(dq)):
                 out.dq[count, x] = dq[x]
             count += 1
@@ -253,8 +324,11 @@ def _fill_states(
     """
     lowest = np.inf
     while i < len(states.first) - 1 and count + len(scratch.vertex) <= len(out.vertex):
-        count, dropped = _fill_from(layers, aim, h, bound, seam, k, states, i, count, scratch, out)
-        lowest, i = min(lowest, dropped), i + 1
+        made, dropped = _fill_from(layers, aim, h, bound, seam, k, states, i, count, scratch, out)
+        lowest = min(lowest, dropped)
+        if made < 0:
+            break
+        count, i = made, i + 1
     return i, count, lowest
 
 
@@ -272,23 +346,28 @@ def _extend(
     )  # fmt: skip
     room = 2 * (end - begin)
     vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
-    out = States(vertex, np.empty(room), np.empty((room, n)), parent, first)
+    way = np.empty(room, np.int64)
+    out = States(vertex, np.empty(room), np.empty((room, n)), parent, way, first)
     i = count = int(first[0])  # 0; a literal 0 would have a different numba type
-    while i < len(first) - 1:
-        if count + end - begin > room:
-            room *= 2
-            out = States(
-                with_more_room(out.vertex),
-                with_more_room(out.d),
-                with_more_room(out.dq),
-                with_more_room(out.parent),
-                first,
-            )
+    while True:
         i, count, dropped = _fill_states(
             layers, aim, h, bound, seam, k, states, i, count, scratch, out
         )
         lowest = min(lowest, dropped)
-    unsorted = States(out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], first)
+        if i == len(first) - 1:
+            break
+        out = States(
+            with_more_room(out.vertex),
+            with_more_room(out.d),
+            with_more_room(out.dq),
+            with_more_room(out.parent),
+            with_more_room(out.way),
+            first,
+        )
+    unsorted = States(
+        out.vertex[:count], out.d[:count], out.dq[:count], out.parent[:count], out.way[:count],
+        first,
+    )  # fmt: skip
     return group_by_vertex(unsorted, begin, end, width), lowest
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.kernels.change_table import NO_TABLE, ChangeTable, fill_change
 from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.limits import acceleration_excess, exceeds
@@ -19,8 +19,10 @@ from kerfpath.kernels.metric import apart, extend, finish, increment, wrap_angle
 from kerfpath.kernels.torque import NO_TORQUE, TorqueTest
 
 __all__ = [
+    "NO_REVERSALS",
     "Aim",
     "LostTime",
+    "ReversalPrices",
     "SortedLayers",
     "arrange",
     "combined",
@@ -79,6 +81,18 @@ class LostTime(NamedTuple):
     """Least cost of a step beyond `Aim.velocity`; infinite if there are none."""
 
 
+class ReversalPrices(NamedTuple):
+    """The cost of joints that turn back."""
+
+    price: Array
+    """(n,): cost of a reversal of each joint; (0,) if none has a cost."""
+    still: float
+    """rad: a joint that moves no further than this in a step does not turn back there."""
+
+
+NO_REVERSALS = ReversalPrices(freeze(np.empty(0)), 0.0)
+
+
 class Aim(NamedTuple):
     """The objective (14) or (15), the bounds (5) and (6) on increments, and bounds on torques."""
 
@@ -101,6 +115,8 @@ class Aim(NamedTuple):
     """By how much larger changes may be at a vertex."""
     torque: TorqueTest = NO_TORQUE
     """Torque limits, kept by the exact recursion if it is not `timed`."""
+    reversals: ReversalPrices = NO_REVERSALS
+    """Counted by the exact recursion if it is not `timed`, with (14)."""
 
 
 @jit

@@ -32,6 +32,8 @@ class States(NamedTuple):
     """(S, n): increment along the edge."""
     parent: Ints
     """(S,): index of the preceding edge among the states of the layer before."""
+    way: Ints
+    """(S,): directions of the joints whose reversals have a price, 0 if none has; see `_turned`."""
     first: Ints
     """(m+1,): the states of vertex start[k] + i are first[i]:first[i+1]."""
 
@@ -70,6 +72,7 @@ def joined_states(one: States, two: States) -> States:
         np.concatenate((one.d, two.d)),
         np.concatenate((one.dq, two.dq)),
         np.concatenate((one.parent, two.parent)),
+        np.concatenate((one.way, two.way)),
         one.first,
     )
 
@@ -110,4 +113,5 @@ def group_by_vertex(states: States, a: int, b: int, width: int) -> States:
             count += 1
     first[b - a] = count
     order = order[:count]
-    return States(vertex[order], d[order], states.dq[order], states.parent[order], first)
+    parent, way = states.parent[order], states.way[order]
+    return States(vertex[order], d[order], states.dq[order], parent, way, first)

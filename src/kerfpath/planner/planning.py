@@ -35,6 +35,7 @@ from kerfpath.planner.continuous import (
 )
 from kerfpath.planner.ends import Ends
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
+from kerfpath.planner.fewer_reversals import plan_with_fewer_reversals
 from kerfpath.planner.folding import all_within_ranges, unfolded, within_ranges
 from kerfpath.planner.on_grid import ON_GRID
 from kerfpath.planner.refinements import refine_plan
@@ -462,6 +463,15 @@ def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tu
             task=task, finder=CollisionFreeSearch(task), begin=begin, refine=asked.refine
         )
 
+    settings = task.settings.without_reversals
+    if settings is not task.settings and (asked.refine or task.settings.method == "continuous"):
+        unpriced = replace(task, settings=settings)
+        begun = [_planned(unpriced, asked, begin)[0]]
+        if task.settings.tilt is not None:
+            rigid = task.with_settings(replace(task.settings, tilt=None))
+            with suppress(NoFeasiblePath):
+                begun.append(_planned(rigid, asked, begin)[0])
+        return plan_with_fewer_reversals(task, unpriced, begun, begin), attempt_of(task)
     attempt, leaping = attempt_of(task), None
     try:
         leaping = first_plan(attempt, strategies(task))

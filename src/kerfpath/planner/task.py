@@ -15,6 +15,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
+from kerfpath.kernels.search import NO_REVERSALS, ReversalPrices
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner.folding import folds
@@ -29,7 +30,7 @@ from kerfpath.planner.layers import (
     within_margins,
 )
 from kerfpath.planner.straight_moves import largest_steps
-from kerfpath.plans import Plan, Proof, on_turns, path_cost
+from kerfpath.plans import STILL, Plan, Proof, on_turns, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
 from kerfpath.setup import Setup
@@ -350,6 +351,7 @@ def _layers(
         most=largest_steps(contour, robot) if options.feed == "dip" else None,
         method="exact" if options.method == "continuous" else options.method,
         posture=graph.posture if options.method == "known" else None,
+        reversals=reversal_prices(options, robot, task.dt),
     )
     return Layered(graph=graph, problem=problem)
 
@@ -407,3 +409,11 @@ def _vertex_cost(
     if comfort is not None and any(band.cost for band in comfort.bands.values()):
         costs.append(comfort.price(robot, graph.q, tool))
     return freeze(np.sum(costs, axis=0)) if costs else None
+
+
+def reversal_prices(options: PlanOptions, robot: Robot, dt: float) -> ReversalPrices:
+    """Return the costs of joints that turn back, for nodes `dt` s apart."""
+    comfort = options.comfort
+    if comfort is None or comfort.reversals is None or not comfort.prices_reversals:
+        return NO_REVERSALS
+    return ReversalPrices(comfort.reversals.per_joint(robot), STILL * dt)

@@ -12,6 +12,7 @@ from kerfpath.plans.plan import JointMotion as JointMotion
 from kerfpath.plans.plan import Plan as Plan
 from kerfpath.plans.plan import Proof as Proof
 from kerfpath.plans.plan import TransferMove as TransferMove
+from kerfpath.plans.plan import directions as directions
 from kerfpath.plans.plan import has_room as has_room
 from kerfpath.plans.plan import joint_columns as joint_columns
 from kerfpath.plans.plan import node_rates as node_rates

@@ -330,17 +330,25 @@ STILL = 1e-4
 """rad/s: a joint that moves more slowly has no direction; its last one holds."""
 
 
-def reversals(rate: Array) -> list[tuple[int, int]]:
-    """Return where joints 1 to 3 turn back: joint, from 0, and the row from which it moves back.
+def directions(rate: Array) -> Array:
+    """Return in which direction each joint moves (m, n): 1 or -1, or 0 if it stands throughout.
 
-    ``rate`` is (m, n) rad/s, joint velocities one after another.
+    ``rate`` is (m, n) rad/s, joint velocities one after another. A joint that is still keeps its
+    last direction, or has the first one if it has not moved yet.
     """
-    found = []
-    for joint, moves in enumerate(rate.T[:PLACING]):
-        at = np.flatnonzero(np.abs(moves) > STILL)
-        turned = at[1:][np.diff(np.sign(moves[at])) != 0]
-        found += [(joint, int(k)) for k in turned]
-    return found
+    moves = np.abs(rate) > STILL
+    last = np.maximum.accumulate(np.where(moves, np.arange(len(rate))[:, None], 0), axis=0)
+    last = np.maximum(last, moves.argmax(axis=0))
+    return np.asarray(np.sign(rate * moves)[last, np.arange(rate.shape[1])])
+
+
+def reversals(rate: Array, joints: Sequence[int] = range(PLACING)) -> list[tuple[int, int]]:
+    """Return where joints turn back: joint, from 0, and the row from which it moves back.
+
+    ``rate`` is (m, n) rad/s, joint velocities one after another; by default joints 1 to 3 count.
+    """
+    turned = np.diff(directions(rate), axis=0) != 0
+    return [(joint, int(k) + 1) for joint in joints for k in np.flatnonzero(turned[:, joint])]
 
 
 def path_cost(
@@ -551,13 +559,19 @@ class Plan:
     def node_cost(self) -> Array | None:
         """Cost of tilt and comfort at each node, (K,); None if they have no cost.
 
-        The cost of clearance is not included, as only a cell knows it.
+        A reversal costs at the node from which the joint moves back. The cost of clearance is not
+        included, as only a cell knows it.
         """
         tilt, comfort, costs = self.settings.tilt, self.settings.comfort, []
         if tilt is not None and tilt.cost:
             costs.append(tilt.price(self.tilt))
         if comfort is not None and any(band.cost for band in comfort.bands.values()):
             costs.append(comfort.price(self.robot, self.q, self.T_flange_tip))
+        if comfort is not None and comfort.reversals is not None and comfort.prices_reversals:
+            price, cost = comfort.reversals.per_joint(self.robot), np.zeros(len(self.q))
+            for joint, k in self.turned_back(np.flatnonzero(price).tolist()):
+                cost[k] += price[joint]
+            costs.append(cost)
         return freeze(np.sum(costs, axis=0)) if costs else None
 
     @property
@@ -594,11 +608,15 @@ class Plan:
         """Second difference at the inner nodes over the acceleration limit, (K-2, n), signed."""
         return freeze(self._rates[1] / self.robot.acceleration_at(self.q[1:-1]))
 
+    def turned_back(self, joints: Sequence[int] = range(PLACING)) -> list[tuple[int, int]]:
+        """Return where joints, from 0, turn back: the joint and the node from which it does."""
+        return reversals(self._rates[0], joints)
+
     @property
     def criteria(self) -> Criteria:
         """The criteria (7) to (9), peak shares of the limits, and least measures of comfort."""
         dq = self.increments
-        turned = [joint for joint, _ in reversals(dq / np.diff(self.time)[:, None])]
+        turned = [joint for joint, _ in self.turned_back()]
         measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
             displacement=metric.total_displacement(dq),

@@ -53,6 +53,9 @@ class LinearModel:
         Couplings.
     weight : (n,) 1/rad
     metric : str
+    held, still : (K-1, n), (K-1,) rad
+        Direction, 1 or -1, that each joint keeps in each interval, but for `still`; 0: either.
+        None: all may go either way.
     cap : float
         Largest distance that is allowed; infinite: any.
     gamma : (K,) rad
@@ -78,6 +81,8 @@ class LinearModel:
     row_upper: Array
     weight: Array
     metric: Metric
+    held: Array | None
+    still: Array
     cap: float
     gamma: Array
     goals: tuple[Goal, ...]
@@ -109,6 +114,10 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     dq, D = np.diff(model.q, axis=0), _increments(model)
     beyond, shares = _limits(rows, dq, D, model, rates, target)
     _ranges(rows, model)
+    if model.held is not None:
+        kept, way = np.flatnonzero(model.held), model.held.ravel()
+        most = np.repeat(model.still / 2, dq.shape[1])[kept]
+        rows.at_most((-way * dq.ravel())[kept], D.scaled(-way).of(kept), most)
     unknown = np.arange(size)[:, None]
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
         rows.hold(Rows(np.full((size, 1), sign), unknown), bound.ravel())

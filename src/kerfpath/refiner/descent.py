@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.kernels.turns import JointLimits
-from kerfpath.plans import path_cost
+from kerfpath.plans import STILL, path_cost
 from kerfpath.progress import may_stop
 from kerfpath.refiner.convex_program import MARGIN, PRICE, LinearModel, Target, solve
 from kerfpath.refiner.goals import Goal
@@ -59,7 +59,8 @@ class MotionState:
     lost : float
         Sum over intervals and nodes of the excess over rate and torque limits, in shares of them.
     outside : float rad
-        Largest distance of a joint or a coupling outside its range; negative inside.
+        Largest distance of a joint or a coupling outside its range, or of a step against the
+        direction that is held; negative inside.
     """
 
     free: Array
@@ -115,6 +116,8 @@ class Descent:
         Bounds on the free variables; infinite for none.
     node_cost : (K,), optional
         Cost of each node, taken as fixed; the cost after gamma has moved is computed at the end.
+    held : (K-1, n), optional
+        Direction, 1 or -1, that each joint keeps in each interval; 0: either. Default: either.
     cap : float
         Largest distance that is allowed in a step.
     goals : tuple of Goal
@@ -135,6 +138,7 @@ class Descent:
     high: Array
     first: float | None = None
     node_cost: Array | None = None
+    held: Array | None = None
     cap: float = np.inf
     goals: tuple[Goal, ...] = ()
     most: int = MOST_PROGRAMS
@@ -306,6 +310,8 @@ class Descent:
             row_upper=self.limits.row_upper - MARGIN,
             weight=self.weight,
             metric=self.metric,
+            held=self.held,
+            still=STILL * self.rates.tau,
             cap=self.cap,
             gamma=np.unwrap(at.free[:, 0]),
             goals=self.goals,
@@ -319,4 +325,7 @@ class Descent:
         value = q @ limits.rows.T
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
         turned = np.abs(q - q[0]) - self.rotation
-        return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))
+        back = -np.inf
+        if self.held is not None:
+            back = (-self.held * np.diff(q, axis=0) - STILL * self.rates.tau[:, None]).max()
+        return float(max(beyond.max(), over.max(initial=-np.inf), turned.max(), back))

@@ -13,7 +13,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import wrap
 from kerfpath.losses import Loss, Reason
-from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
+from kerfpath.plans import Plan, Proof, directions, has_room, on_turns, path_cost
 from kerfpath.refiner.descent import MOST_PROGRAMS, Descent, MotionState
 from kerfpath.refiner.goals import Goal
 from kerfpath.refiner.joint_curves import JointCurves, room_at_ends
@@ -95,7 +95,8 @@ def refine(
     Sequential convex programming on the true kinematics. (5), (6), limits on torque and jerk, the
     ranges of joints and couplings and a periodic closure are hard constraints of every iteration. A
     motion is accepted only if it keeps all of them by the kinematics and the dynamics themselves,
-    not only by the linear model.
+    not only by the linear model. Where reversals cost and the plan keeps the limits, there are two
+    descents, one of which turns no joint back where the plan does not; the better result counts.
 
     Parameters
     ----------
@@ -152,7 +153,20 @@ def refine(
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "the cost of clearance is known on the grid only")
     descent, start = _descent(asked, kept, within=within, most=most, goals=goals)
-    descent = replace(descent, first=first)
+    ways = [replace(descent, first=first)]
+    if comfort is not None and comfort.reversals is not None and start.admitted:
+        price = comfort.reversals.per_joint(plan.robot)
+        held = directions(np.diff(start.q, axis=0) / descent.rates.tau[:, None])
+        ways += [replace(ways[0], held=np.where(price > 0, held, 0.0))] * bool(price.any())
+    found = [_moved(plan, asked, way, start, least) for way in ways]
+    return min(found, key=lambda each: (not each.done, each.cost_after))
+
+
+def _moved(
+    plan: Plan, asked: Plan, descent: Descent, start: MotionState, least: float
+) -> Refinement:
+    """Return the refinement of a plan, asked with other settings, by a descent from a start."""
+    settings, comfort = asked.settings, asked.settings.comfort
     found, programs = _lowest(descent, start, least)
     if found.admitted and not _room_kept(asked, found):
         descent = _ends_held(descent, start)
@@ -177,7 +191,7 @@ def refine(
         plan=replace(refined, proof=proof),
         done=True,
         cost_before=start.cost,
-        cost_after=found.cost if goals else refined.cost,
+        cost_after=found.cost if descent.goals else refined.cost,
         programs=programs,
         statement=proof.statement,
     )

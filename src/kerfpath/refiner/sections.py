@@ -114,6 +114,7 @@ def _section(
         low=low,
         high=high,
         node_cost=None,
+        held=None if descent.held is None else descent.held[first:last],
         first=None,
         radius=min(descent.first or descent.radius, BENDS * bend),
         most=min(descent.most, PROGRAMS),

@@ -68,8 +68,8 @@ def find_least_interval(problem: SearchProblem) -> LeastInterval:
     Parameters
     ----------
     problem : SearchProblem
-        K >= 2; vertices cost 0, or infinity if closed. Its dt, weights, metric and objective do not
-        matter.
+        K >= 2; vertices cost 0, or infinity if closed. Its dt, weights, metric, objective and costs
+        of reversals do not matter.
 
     Raises
     ------

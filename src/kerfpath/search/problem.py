@@ -30,7 +30,7 @@ from kerfpath.kernels import search as kernel
 from kerfpath.kernels.change_table import NO_TABLE, ChangeTable
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN, increments, increments_between, wrap
-from kerfpath.kernels.search import Aim, SortedLayers
+from kerfpath.kernels.search import NO_REVERSALS, Aim, ReversalPrices, SortedLayers
 from kerfpath.kernels.torque import NO_TORQUE, TorqueTest
 from kerfpath.limits import Limits
 from kerfpath.losses import Loss, Reason
@@ -296,7 +296,8 @@ def _turning_least(layers: Layers, aim: Aim, joints: Bools) -> tuple[Aim, Layers
 
     That path shows soonest whether the limits leave a path.
     """
-    aim = aim._replace(weight=freeze(joints.astype(float)), metric=MANHATTAN, minimax=False)
+    weight = freeze(joints.astype(float))
+    aim = aim._replace(weight=weight, metric=MANHATTAN, minimax=False, reversals=NO_REVERSALS)
     return aim, layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
 
 
@@ -441,13 +442,17 @@ class SearchProblem:
         Largest change of each joint from node to node, whatever its limits; default: none.
     method : {"exact", "paper", "known"}
         Method of `find_shortest`; all other searches are exact.
+    reversals : ReversalPrices, optional
+        Costs of joints that turn back from one step to the next; `find_shortest` adds them to the
+        objective. Default: none.
 
     Raises
     ------
     InputError
         Arrays whose shapes do not fit, NaN, a dt that is not positive, unknown names, a finite
-        rotation of a joint that is not endless, or another method than "exact" with a closure, a
-        rotation, or a limit on torque or jerk.
+        rotation of a joint that is not endless, another method than "exact" with a closure, a
+        rotation, or a limit on torque or jerk, or costs of reversals with another method or
+        objective than "exact" and "sum".
     """
 
     q: Array
@@ -465,6 +470,7 @@ class SearchProblem:
     most: Array
     method: Method
     posture: Ints | None
+    reversals: ReversalPrices
 
     __repr__ = short_repr
 
@@ -486,6 +492,7 @@ class SearchProblem:
         most: ArrayLike | None = None,
         method: Method = "exact",
         posture: ArrayLike | None = None,
+        reversals: ReversalPrices = NO_REVERSALS,
     ) -> None:
         for name, value, known in (
             ("method", method, get_args(Method)),
@@ -520,6 +527,7 @@ class SearchProblem:
             ),
             "method": method,
             "posture": None if posture is None else integers(posture, "posture", (N,)),
+            "reversals": reversals,
         }
         for name, value in cast.items():
             object.__setattr__(self, name, value)
@@ -531,18 +539,25 @@ class SearchProblem:
             if method != "exact" and getattr(limits, name) is not None:
                 raise InputError(f'{name}: a limit needs method="exact", got method={method!r}')
 
+        if len(reversals.price) and (method, objective) != ("exact", "sum"):
+            raise InputError(
+                'reversals: a cost needs method="exact" and objective="sum", got '
+                f"method={method!r} and objective={objective!r}"
+            )
+
     @property
     def layers(self) -> Layers:
         """The layered graph."""
         return Layers(self.q, self.start, self.endless, self.vertex_cost, self.shut)
 
     def free(self) -> SearchProblem:
-        """Return the problem without closure, rotation limits and costs of open vertices."""
+        """Return the problem without closure, rotation limits, and costs but distances."""
         return replace(
             self,
             vertex_cost=np.where(self.vertex_cost < np.inf, 0.0, np.inf),
             closure="free",
             rotation=np.full(len(self.endless), np.inf),
+            reversals=NO_REVERSALS,
         )
 
     @property
@@ -559,6 +574,7 @@ class SearchProblem:
             torque=NO_TORQUE
             if torque is None
             else TorqueTest(arm=torque.dynamics.bodies, bound=torque.bound, dt=self.dt),
+            reversals=self.reversals,
         )
 
 

@@ -282,7 +282,8 @@ def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
     parent = before[vertex]
     dq = increments_between(layers.given[:, parent].T, layers.given[:, vertex].T, layers.endless)
     first = np.searchsorted(vertex, np.arange(a, b + 1))
-    return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, first)
+    way = np.zeros_like(vertex)
+    return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, way, first)
 
 
 def _require_same_ends(given: Layers) -> None:

@@ -83,11 +83,13 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
         A layer is empty, or closed vertices, shut edges and the largest steps of the problem leave
         no path; the message says where.
     InputError
-        Another objective, a closure, a limit on rotation, torque or jerk, or a penalty that is not
-        positive.
+        Another objective, a closure, a limit on rotation, torque or jerk, costs of reversals, or a
+        penalty that is not positive.
     """
     refuse_ends(problem, "slowed path")
     refuse_torque(problem, "slowed path")
+    if len(problem.reversals.price):
+        raise InputError("reversals: a slowed path has no costs of reversals; remove them")
     if problem.objective != "sum":
         raise InputError(f'objective: a slowed path needs "sum", got "{problem.objective}"')
     penalty = scalar(penalty, "penalty", above=0.0)

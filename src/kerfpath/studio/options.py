@@ -75,6 +75,12 @@ def _groups() -> dict[str, tuple[OptionField, ...]]:
             *_band("shoulder", "Shoulder singularity", "mm"),
             *_band("manipulability", "Manipulability", "m3"),
             *_band("clearance", "Clearance", "mm"),
+            _field("comfort.reversals_cost", "Reversals, cost of each"),
+            _field(
+                "comfort.reversals_joints",
+                "Joints whose reversals cost",
+                needs="comfort.reversals_cost",
+            ),
         ),
         "Bound": tuple(_planning("Bound")),
         "Order and transfer moves": (

@@ -332,6 +332,24 @@ FAULTS = [
     ("[program]", "[comfort]\nshoulder_deg = 9\n[program]", 22, "nearest: shoulder_"),
     (
         "[program]",
+        "[comfort]\nreversals_joints = [1]\n[program]",
+        22,
+        "reversals_cost with reversals_joints",
+    ),
+    (
+        "[program]",
+        "[comfort]\nreversals_cost = 1\nreversals_joints = [7]\n[program]",
+        23,
+        "comfort.reversals_joints: expected joints from 1 to 6, got 7",
+    ),
+    (
+        "[program]",
+        'feed = "dip"\n[comfort]\nreversals_cost = 1\n[program]',
+        23,
+        "reversals_cost: expected feed = .constant. with reversals_cost, got .dip.",
+    ),
+    (
+        "[program]",
         "[comfort]\nclearance_band_mm = 9\nclearance_cost = 1\n[program]",
         22,
         "comfort.clearance_band_mm: expected .cell. with .*got none",

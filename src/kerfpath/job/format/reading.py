@@ -291,7 +291,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         moves = file.program.language != "none" or file.sequence is not None
         options = file.plan.resolve(
             robot,
-            comfort=_comfort(file, robot),
+            comfort=_comfort(path, file, robot),
             retract=file.program.retract_mm / 1000 if moves else None,
             floor=file.robot.height_of_floor(),
         )
@@ -446,7 +446,7 @@ def _expressible(path: Path, file: JobFile, robot: Robot) -> Robot:
     return robot.with_limits(lower=lower, upper=upper)
 
 
-def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
+def _comfort(path: Path, file: JobFile, robot: Robot) -> Comfort | None:
     """Return the margins and penalties of plans.
 
     By default joints keep a margin to their limits, for the digits of a program and for straight
@@ -455,7 +455,14 @@ def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
     limits, own = robot.joint_limits(), slice(robot.family.joints)
     ranges = (limits.upper - limits.lower)[own][~limits.endless[own]]
     wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
-    return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
+    try:
+        comfort = file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
+        if comfort is not None and comfort.reversals is not None:
+            comfort.reversals.per_joint(robot)
+    except InputError as error:
+        said = str(error).removeprefix("comfort reversals joints: ")
+        raise refusal_at(path, ("comfort", "reversals_joints"), said) from None
+    return comfort
 
 
 class _OnlyPart(Table):

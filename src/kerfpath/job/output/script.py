@@ -108,7 +108,7 @@ ANGLES = {"angle", "lower", "upper", "velocity", "acceleration"} | {
 }
 """Arguments in rad, rad/s and rad/s^2, which are written in degrees if that loses no digit."""
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
-CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Tilt")
+CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Reversals", "Tilt")
 """Names that the planning options may use."""
 OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "cylinder", "link_capsules", "thicken", "weld")
 """Names that a cell may use."""

@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from kerfpath.comfort import Band, Comfort
+from kerfpath.comfort import Band, Comfort, Reversals
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables.cell import CellTable, ToolTable
 from kerfpath.job.format.tables.part import (
@@ -75,6 +75,9 @@ RoomOrNone = Annotated[NotNegative | None, key("a number not below 0, in deg", "
 Length = Annotated[Positive | None, key("a number above 0, in mm", "50")]
 Volume = Annotated[Positive | None, key("a number above 0, in m^3", "0.05")]
 Cost = Annotated[NotNegative | None, key("a number not below 0", "1")]
+Numbers = Annotated[
+    list[Annotated[int, Field(ge=1)]] | None, key("numbers of joints, from 1", "[1, 2, 3]")
+]
 
 DEGREE = float(np.radians(1.0))
 UNITS = {
@@ -89,7 +92,7 @@ UNITS = {
 
 
 class ComfortTable(Table):
-    """[comfort]: margins that are kept, and bands beyond them in which a node has a penalty."""
+    """[comfort]: margins that are kept, and penalties beyond them and for joints that turn back."""
 
     wrist_margin_deg: Angle = None
     wrist_band_deg: Angle = None
@@ -108,6 +111,8 @@ class ComfortTable(Table):
     manipulability_cost: Cost = None
     clearance_band_mm: Length = None
     clearance_cost: Cost = None
+    reversals_cost: Cost = None
+    reversals_joints: Numbers = None
 
     @model_validator(mode="after")
     def _goes_together(self) -> ComfortTable:
@@ -117,26 +122,32 @@ class ComfortTable(Table):
             for one, other in (keys, keys[::-1]):
                 if getattr(self, one) is not None and getattr(self, other) is None:
                     raise fault(f"{other} with {one}", "none", f"add {other}", (one,))
+        if self.reversals_joints is not None and self.reversals_cost is None:
+            here = ("reversals_joints",)
+            raise fault("reversals_cost with reversals_joints", "none", "add reversals_cost", here)
         return self
 
     def resolve(self, usual: Mapping[str, float] | None = None) -> Comfort | None:
-        """Return the margins and bands of the table, in SI; None if there are none.
+        """Return the margins, bands and costs of the table, in SI; None if there are none.
 
         `usual` has default margins by measure, in the unit of its keys, where the table sets none.
         """
-        bands = {}
+        asked: dict[str, Any] = {}
         for name, (unit, si) in UNITS.items():
             # The margin of clearance is the near-miss distance of the cell.
             margin = getattr(self, f"{name}_margin_{unit}", None)
             margin = (usual or {}).get(name) if margin is None else margin
             width = getattr(self, f"{name}_band_{unit}")
             if margin or width is not None:
-                bands[name] = Band(
+                asked[name] = Band(
                     margin=(margin or 0.0) * si,
                     width=(width or 0.0) * si,
                     cost=getattr(self, f"{name}_cost") or 0.0,
                 )
-        return Comfort(**bands) if bands else None
+        if self.reversals_cost:
+            joints = (1, 2, 3) if self.reversals_joints is None else self.reversals_joints
+            asked["reversals"] = Reversals(cost=self.reversals_cost, joints=tuple(joints))
+        return Comfort(**asked) if asked else None
 
 
 # -----------------------------------------------------------------------------

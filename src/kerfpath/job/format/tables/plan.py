@@ -10,7 +10,14 @@ from pydantic import create_model, model_validator
 from kerfpath.certificate import Certify
 from kerfpath.job.format.tables.table import Table, fields_of
 from kerfpath.job.format.values import Positive, fault, key
-from kerfpath.options import CLEARANCE, EXACT_OR_BETTER, PENALTIES, OptionConflict, PlanOptions
+from kerfpath.options import (
+    CLEARANCE,
+    EXACT_OR_BETTER,
+    PENALTIES,
+    REVERSALS,
+    OptionConflict,
+    PlanOptions,
+)
 from kerfpath.robots import Robot, postures_named
 from kerfpath.setting import keys, settings
 from kerfpath.tilt import Tilt
@@ -70,6 +77,7 @@ class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions
 def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str, str], str]:
     """Return the key of two options in conflict, and the message in the words of a job."""
     names = {CLEARANCE: "clearance_band_mm", PENALTIES: "costs in [comfort]"}
+    names[REVERSALS] = "reversals_cost"
     for name, each in settings(PlanOptions).items():
         names[name] = next(iter(each.keys), name)
     key = names[conflict.option]
@@ -79,8 +87,9 @@ def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str,
         for name, value in conflict.beside.items()
     )
     said = f"expected {expected} with {beside}, got {_toml(getattr(table, key))}; change one"
-    if CLEARANCE in conflict.beside:
-        return ("comfort", names[CLEARANCE]), said
+    for name in (CLEARANCE, REVERSALS):
+        if name in conflict.beside:
+            return ("comfort", names[name]), said
     of_both = (key, *(names[name] for name in conflict.beside))
     return ("plan", next((each for each in of_both if each in table.model_fields_set), key)), said
 
