@@ -421,10 +421,13 @@ def test_a_plan_file_tells_the_comfort_asked_for(small, tmp_path):
     assert told["criteria"]["nearest"]["shoulder"]["unit"] == "m"
 
 
-def test_the_page_s_example_runs_and_keeps_its_margins(capsys):
+def test_the_page_s_examples_run_and_keep_what_it_says(capsys):
     page = (ROOT / "docs" / "comfort.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    exec(compile(code, "comfort.md", "exec"), {})
+    margins, reversals = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    names: dict[str, object] = {}
+    exec(compile(margins, "comfort.md", "exec"), names)
     wrist, _, limits = map(float, capsys.readouterr().out.split())
     assert wrist >= 5
     assert limits >= 3
+    exec(compile(reversals, "comfort.md", "exec"), names)
+    assert capsys.readouterr().out.split() == ["2", "0.64", "2", "1.14", "0", "0.88"]

@@ -159,6 +159,8 @@ class Reversals:
     cost: float
     joints: tuple[int, ...] = (1, 2, 3)
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         cost = not_negative(self.cost, "comfort reversals cost")
         object.__setattr__(self, "cost", cost)
