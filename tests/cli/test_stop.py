@@ -17,7 +17,7 @@ from commands import run
 from jobs import DEMO, SMALL
 
 KERFPATH = Path(sys.executable).parent / "kerfpath"
-TRIES = int(os.environ.get("KERFPATH_STOPS", "8"))
+TRIES = int(os.environ.get("KERFPATH_STOPS", "6"))
 """More than the suite can wait for are asked for by hand."""
 
 
