@@ -244,9 +244,10 @@ class Comfort:
     @classmethod
     def from_data(cls, data: Mapping[str, BandData | ReversalsData]) -> Comfort:
         """Return the bands and reversals that `to_data` wrote."""
-        made: dict[str, Any] = {}
-        for name, each in data.items():
-            made[name] = (Reversals if name == "reversals" else Band)(**each)
+        made: dict[str, Any] = {
+            name: (Reversals if name == "reversals" else Band)(**each)
+            for name, each in data.items()
+        }
         return cls(**made)
 
     @property
@@ -265,6 +266,18 @@ class Comfort:
         """Whether reversals cost; the cost depends on two steps, not on a node."""
         return self.reversals is not None and self.reversals.cost > 0
 
+    def price_of_reversals(self, robot: Robot) -> Array:
+        """Return the cost (n,) of a reversal of each joint of a robot; 0 if it does not count.
+
+        Raises
+        ------
+        InputError
+            The robot has no such joint.
+        """
+        if self.reversals is None:
+            return freeze(np.zeros(robot.joints))
+        return self.reversals.per_joint(robot)
+
     @property
     def prices_clearance(self) -> bool:
         """Whether small clearance costs; the cost is known only at the vertices of a graph."""
@@ -273,9 +286,9 @@ class Comfort:
     @property
     def hard(self) -> Comfort:
         """The margins alone, without costs."""
-        bands: dict[str, Any] = {}
-        for name, band in self.bands.items():
-            bands[name] = Band(margin=band.margin)
+        bands: dict[str, Any] = {
+            name: Band(margin=band.margin) for name, band in self.bands.items()
+        }
         return Comfort(**bands)
 
     def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[Reason, Bools]:

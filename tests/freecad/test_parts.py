@@ -416,7 +416,7 @@ def test_edges_are_open_lines_in_order():
 
 def test_lines_are_a_table_that_a_job_reads(tmp_path):
     down = (0, 0, -1)
-    lines = {"line1": [((0, 0, 3), down), ((10, 0, 3), down)], "line2": [((1e-9, 5, 3), down)] * 1}
+    lines = {"line1": [((0, 0, 3), down), ((10, 0, 3), down)], "line2": [((1e-9, 5, 3), down)]}
     lines["line2"].append(((0, 95.123456, 3), (0, 0.6, -0.8)))
     (tmp_path / "lines.csv").write_text(geometry.table(lines))
     read_back = cad.read(tmp_path / "lines.csv")

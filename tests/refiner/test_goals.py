@@ -95,7 +95,7 @@ def test_no_change_within_the_limits_is_better_by_the_linear_model(kind, seed):
         acceleration=LinearAcceleration(
             rates.acceleration(q), np.arange(1, K - 1), np.zeros((K - 2, n, 1))
         ),
-        held=None, still=np.zeros(K - 1),
+        held=None,
     )  # fmt: skip
 
     def value(delta):

@@ -170,7 +170,6 @@ def _random_model(rng, metric, *, cap=np.inf, free=1, varies=False):
         goals=(),
         acceleration=LinearAcceleration(np.empty((0, n)), np.empty(0, int), np.empty((0, n, free))),
         held=None,
-        still=np.zeros(K - 1),
     )
     dq = np.diff(q, axis=0)
     tau = rng.uniform(0.5, 1.5, K - 1)

@@ -413,7 +413,6 @@ def _vertex_cost(
 
 def reversal_prices(options: PlanOptions, robot: Robot, dt: float) -> ReversalPrices:
     """Return the costs of joints that turn back, for nodes `dt` s apart."""
-    comfort = options.comfort
-    if comfort is None or comfort.reversals is None or not comfort.prices_reversals:
+    if options.comfort is None or not options.comfort.prices_reversals:
         return NO_REVERSALS
-    return ReversalPrices(comfort.reversals.per_joint(robot), STILL * dt)
+    return ReversalPrices(options.comfort.price_of_reversals(robot), STILL * dt)

@@ -567,8 +567,8 @@ class Plan:
             costs.append(tilt.price(self.tilt))
         if comfort is not None and any(band.cost for band in comfort.bands.values()):
             costs.append(comfort.price(self.robot, self.q, self.T_flange_tip))
-        if comfort is not None and comfort.reversals is not None and comfort.prices_reversals:
-            price, cost = comfort.reversals.per_joint(self.robot), np.zeros(len(self.q))
+        if comfort is not None and comfort.prices_reversals:
+            price, cost = comfort.price_of_reversals(self.robot), np.zeros(len(self.q))
             for joint, k in self.turned_back(np.flatnonzero(price).tolist()):
                 cost[k] += price[joint]
             costs.append(cost)

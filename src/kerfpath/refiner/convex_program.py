@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.plans import STILL
 from kerfpath.refiner.goals import Goal
 from kerfpath.refiner.rates import LinearAcceleration, LinearTorque, RateLimits
 from kerfpath.refiner.rows import ConstraintRows, Rows
@@ -53,8 +54,8 @@ class LinearModel:
         Couplings.
     weight : (n,) 1/rad
     metric : str
-    held, still : (K-1, n), (K-1,) rad
-        Direction, 1 or -1, that each joint keeps in each interval, but for `still`; 0: either.
+    held : (K-1, n) or None
+        Direction, 1 or -1, that each joint keeps in each interval unless it is still; 0: either.
         None: all may go either way.
     cap : float
         Largest distance that is allowed; infinite: any.
@@ -82,7 +83,6 @@ class LinearModel:
     weight: Array
     metric: Metric
     held: Array | None
-    still: Array
     cap: float
     gamma: Array
     goals: tuple[Goal, ...]
@@ -116,7 +116,7 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     _ranges(rows, model)
     if model.held is not None:
         kept, way = np.flatnonzero(model.held), model.held.ravel()
-        most = np.repeat(model.still / 2, dq.shape[1])[kept]
+        most = np.repeat(STILL * rates.tau / 2, dq.shape[1])[kept]
         rows.at_most((-way * dq.ravel())[kept], D.scaled(-way).of(kept), most)
     unknown = np.arange(size)[:, None]
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):

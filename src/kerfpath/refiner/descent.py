@@ -311,7 +311,6 @@ class Descent:
             weight=self.weight,
             metric=self.metric,
             held=self.held,
-            still=STILL * self.rates.tau,
             cap=self.cap,
             gamma=np.unwrap(at.free[:, 0]),
             goals=self.goals,

@@ -154,10 +154,10 @@ def refine(
         return _unrefined(plan, "the cost of clearance is known on the grid only")
     descent, start = _descent(asked, kept, within=within, most=most, goals=goals)
     ways = [replace(descent, first=first)]
-    if comfort is not None and comfort.reversals is not None and start.admitted:
-        price = comfort.reversals.per_joint(plan.robot)
+    if comfort is not None and comfort.prices_reversals and start.admitted:
+        price = comfort.price_of_reversals(plan.robot)
         held = directions(np.diff(start.q, axis=0) / descent.rates.tau[:, None])
-        ways += [replace(ways[0], held=np.where(price > 0, held, 0.0))] * bool(price.any())
+        ways.append(replace(ways[0], held=np.where(price > 0, held, 0.0)))
     found = [_moved(plan, asked, way, start, least) for way in ways]
     return min(found, key=lambda each: (not each.done, each.cost_after))
 

@@ -3,6 +3,7 @@
 Messages are read by the names of their fields, whichever package made them; `rclpy` is not needed.
 """
 
+from kerfpath.ros.goal import PREEMPTED as PREEMPTED
 from kerfpath.ros.goal import Setting as Setting
 from kerfpath.ros.goal import display_trajectory as display_trajectory
 from kerfpath.ros.goal import plan_goal as plan_goal

@@ -344,6 +344,12 @@ FAULTS = [
     ),
     (
         "[program]",
+        "[comfort]\nreversals_cost = 1\nreversals_joints = [2, 2]\n[program]",
+        23,
+        "comfort.reversals_joints: expected different numbers of joints",
+    ),
+    (
+        "[program]",
         'feed = "dip"\n[comfort]\nreversals_cost = 1\n[program]',
         23,
         "reversals_cost: expected feed = .constant. with reversals_cost, got .dip.",

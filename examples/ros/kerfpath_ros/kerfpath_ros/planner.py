@@ -17,10 +17,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rosidl_runtime_py import set_message_fields
 
-from kerfpath.ros import Setting, display_trajectory, plan_goal
-
-PREEMPTED = -7
-"""Of moveit_msgs/MoveItErrorCodes."""
+from kerfpath.ros import PREEMPTED, Setting, display_trajectory, plan_goal
 
 
 class Planner(Node):

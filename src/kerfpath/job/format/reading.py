@@ -455,10 +455,10 @@ def _comfort(path: Path, file: JobFile, robot: Robot) -> Comfort | None:
     limits, own = robot.joint_limits(), slice(robot.family.joints)
     ranges = (limits.upper - limits.lower)[own][~limits.endless[own]]
     wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
+    comfort = file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
     try:
-        comfort = file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
-        if comfort is not None and comfort.reversals is not None:
-            comfort.reversals.per_joint(robot)
+        if comfort is not None:
+            comfort.price_of_reversals(robot)
     except InputError as error:
         said = str(error).removeprefix("comfort reversals joints: ")
         raise refusal_at(path, ("comfort", "reversals_joints"), said) from None

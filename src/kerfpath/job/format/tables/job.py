@@ -122,9 +122,13 @@ class ComfortTable(Table):
             for one, other in (keys, keys[::-1]):
                 if getattr(self, one) is not None and getattr(self, other) is None:
                     raise fault(f"{other} with {one}", "none", f"add {other}", (one,))
-        if self.reversals_joints is not None and self.reversals_cost is None:
+        if (joints := self.reversals_joints) is not None:
             here = ("reversals_joints",)
-            raise fault("reversals_cost with reversals_joints", "none", "add reversals_cost", here)
+            if self.reversals_cost is None:
+                said = "reversals_cost with reversals_joints"
+                raise fault(said, "none", "add reversals_cost", here)
+            if not 0 < len(set(joints)) == len(joints):
+                raise fault("different numbers of joints", str(joints), "name each once", here)
         return self
 
     def resolve(self, usual: Mapping[str, float] | None = None) -> Comfort | None:
@@ -145,8 +149,9 @@ class ComfortTable(Table):
                     cost=getattr(self, f"{name}_cost") or 0.0,
                 )
         if self.reversals_cost:
-            joints = (1, 2, 3) if self.reversals_joints is None else self.reversals_joints
-            asked["reversals"] = Reversals(cost=self.reversals_cost, joints=tuple(joints))
+            joints = self.reversals_joints
+            own: dict[str, Any] = {} if joints is None else {"joints": tuple(joints)}
+            asked["reversals"] = Reversals(cost=self.reversals_cost, **own)
         return Comfort(**asked) if asked else None
 
 
