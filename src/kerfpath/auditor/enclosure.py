@@ -27,6 +27,8 @@ CURVED = 2.0
 """Factor by which a curve may be wider than a box; beyond it the box is used."""
 ANY = float(np.nextafter(np.pi, 4.0))
 """rad: radius that covers every angle."""
+POINT = np.array([[0.0], [0.0], [0.0], [1.0]])
+"""One for the point of columns x, y, z, point, and zero for the axes."""
 
 
 class Status(IntEnum):
@@ -159,7 +161,7 @@ def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Inter
     """Return the fixed poses before and after the rotation of the tool, rows first.
 
     They are the task frames in the model's base (3, 4, K), and the axes and the wrist point of the
-    model's end in the tip's frame, as columns x, y, z, point (3, 4).
+    model's end in the tip's frame, as columns x, y, z, point (3, 4, 1).
     """
     before = _product(_foot(robot), _rigid(np.moveaxis(frames, 0, -1)))
     flange = _inverse(_rigid(T_flange_tip[..., None]))
@@ -171,16 +173,14 @@ def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Inter
     return before, Interval(np.swapaxes(columns.lo, 0, 1), np.swapaxes(columns.hi, 0, 1))
 
 
-def seen_from_foot(
-    robot: Robot, direction: list[Interval], point: Interval
-) -> tuple[list[Interval], list[Interval]]:
-    """Return a direction and a point of the robot base in the model's base, three numbers each."""
+def seen_from_foot(robot: Robot, direction: Interval, point: Interval) -> tuple[Interval, Interval]:
+    """Return a direction and a point of the robot base in the model's base, (3,) each."""
     foot = _foot(robot)[..., 0]
-    ends = []
-    for x, y, z in (direction, [point[i] for i in range(3)]):
-        ends.append([foot[i, 0] * x + foot[i, 1] * y + foot[i, 2] * z for i in range(3)])
-    turned, placed = ends
-    return turned, [each + foot[i, 3] for i, each in enumerate(placed)]
+
+    def turned(v: Interval) -> Interval:
+        return foot[:, 0] * v[0] + foot[:, 1] * v[1] + foot[:, 2] * v[2]
+
+    return turned(direction), turned(point) + foot[:, 3]
 
 
 def _foot(robot: Robot) -> Interval:
@@ -256,19 +256,11 @@ def _enclose(robot: Robot, before: Interval, after: Interval, turn: Jet) -> Encl
 def _turned_pose(before: Interval, after: Interval, turn: Jet) -> Pose:
     """Return the pose of the model's end: before . Rz(gamma) . after."""
     c, s = turn.cos_sin()
-    columns = []
-    for j in range(4):
-        x, y, z = after[0, j], after[1, j], after[2, j]
-        column = []
-        for i in range(3):
-            along = before[i, 0] * x + before[i, 1] * y
-            across = before[i, 1] * x - before[i, 0] * y
-            rest = before[i, 2] * z
-            if j == 3:
-                rest = rest + before[i, 3]
-            column.append((c.times(along) + s.times(across)).plus(rest))
-        columns.append((column[0], column[1], column[2]))
-    return Pose(x=columns[0], y=columns[1], z=columns[2], point=columns[3])
+    b, (x, y, z) = before[:, :, None], (after[i] for i in range(3))
+    along = b[:, 0] * x + b[:, 1] * y
+    across = b[:, 1] * x - b[:, 0] * y
+    rest = b[:, 2] * z + b[:, 3].scaled(POINT)
+    return Pose((c.times(along) + s.times(across)).plus(rest))
 
 
 def _described(q: Jet, smooth: Bools, none: Bools) -> tuple[Array, Array, Array, Array, Array]:

@@ -9,6 +9,7 @@ derivative over [-h, h] therefore also proves that the function is defined and s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -195,6 +196,17 @@ class Jet:
 
     __repr__ = short_repr
 
+    def __getitem__(self, index: Any) -> Jet:
+        """Return some of the functions; t does not depend on the axes that are indexed."""
+        return Jet(
+            self.at[index],
+            self.slope[index],
+            self.value[index],
+            self.rate[index],
+            self.bend[index],
+            self.half,
+        )
+
     def __neg__(self) -> Jet:
         return Jet(-self.at, -self.slope, -self.value, -self.rate, -self.bend, self.half)
 
@@ -292,6 +304,25 @@ def constant(number: Interval, like: Jet) -> Jet:
     """Return a number that does not depend on t as a jet."""
     zero = exact(0.0)
     return Jet(number, zero, number, zero, zero, like.half)
+
+
+def joined(jets: Sequence[Jet], axis: int = 0) -> Jet:
+    """Return jets of the same t as one, along an axis that they have."""
+
+    def along(parts: list[Interval]) -> Interval:
+        return Interval(
+            np.concatenate([part.lo for part in parts], axis),
+            np.concatenate([part.hi for part in parts], axis),
+        )
+
+    return Jet(
+        along([jet.at for jet in jets]),
+        along([jet.slope for jet in jets]),
+        along([jet.value for jet in jets]),
+        along([jet.rate for jet in jets]),
+        along([jet.bend for jet in jets]),
+        jets[0].half,
+    )
 
 
 def angle_from(middle: Array, half: Array) -> Jet:

@@ -16,8 +16,14 @@ from scipy.spatial.transform import Rotation
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.auditor.acceleration import scarcity
 from kerfpath.auditor.chain import JointChain
-from kerfpath.auditor.enclosure import fixed_poses, joints_of, require_closed_form, seen_from_foot
-from kerfpath.auditor.jets import Interval, Jet, angle_from, constant, exact
+from kerfpath.auditor.enclosure import (
+    POINT,
+    fixed_poses,
+    joints_of,
+    require_closed_form,
+    seen_from_foot,
+)
+from kerfpath.auditor.jets import Interval, Jet, angle_from, constant, exact, joined
 from kerfpath.auditor.postures import POSTURES_OF, Pose
 from kerfpath.errors import InputError
 from kerfpath.options import Interpolation
@@ -147,9 +153,6 @@ def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
 # -----------------------------------------------------------------------------
 # Enclosures of a pose that moves with the part, as seen from the robot base on external axes.
 
-Column = tuple[Jet, Jet, Jet]
-"""A direction or a point."""
-
 
 class CarryingAxes:
     """The external axes of a robot in the frame of its model's base, with all axes at zero."""
@@ -162,14 +165,14 @@ class CarryingAxes:
         # outermost of the axes under the robot comes before the inner ones.
         self._passed = [_Axis(robot, *each) for each in [*part[::-1], *carriers]]
 
-    def moved(self, columns: list[Column], values: list[Jet]) -> list[Column]:
+    def moved(self, columns: Jet, values: Jet) -> Jet:
         """Return axes x, y, z and a point of a frame that moves with the part, in the moved base.
 
         Parameters
         ----------
-        columns : four columns of jets
+        columns : Jet (3, 4, S)
             x, y, z and the point with all axes at zero.
-        values : list of Jet
+        values : Jet (E, S)
             Values of the axes, rad or m.
         """
         for axis in self._passed:
@@ -186,35 +189,30 @@ class _Axis:
         self._turns = axis.kind == "rotary"
         unit = exact(axis.axis)
         size = (unit[0].square() + unit[1].square() + unit[2].square()).sqrt()
-        direction = [unit[i] / size for i in range(3)]
-        self._direction, self._point = seen_from_foot(robot, direction, exact(axis.point))
+        direction, point = seen_from_foot(robot, unit / size, exact(axis.point))
+        self._direction, self._point = direction[:, None, None], point[:, None, None].scaled(POINT)
 
-    def moved(self, columns: list[Column], value: Jet) -> list[Column]:
-        """Return axes and point of a frame moved by this axis to a value."""
-        *axes, point = columns
+    def moved(self, columns: Jet, value: Jet) -> Jet:
+        """Return axes and point (3, 4, S) of a frame moved by this axis to a value (S,)."""
         value = value.scaled(self._sign)
         if not self._turns:
-            way = [p + value.times(k) for p, k in zip(point, self._direction, strict=True)]
-            return [*axes, (way[0], way[1], way[2])]
-        c, s = value.cos_sin()
-        x, y, z = (p.plus(-o) for p, o in zip(point, self._point, strict=True))
-        u, v, w = self._turned((x, y, z), c, s)
-        a, b, d = self._point
-        return [*(self._turned(each, c, s) for each in axes), (u.plus(a), v.plus(b), w.plus(d))]
+            return columns + value.times(self._direction.scaled(POINT))
+        return self._turned(columns.plus(-self._point), *value.cos_sin()).plus(self._point)
 
-    def _turned(self, r: Column, c: Jet, s: Jet) -> Column:
-        """Return a vector turned about the direction k by an angle of cosine c and sine s.
+    def _turned(self, r: Jet, c: Jet, s: Jet) -> Jet:
+        """Return vectors (3, ...) turned about the direction k by an angle of cosine c and sine s.
 
         By Rodrigues' formula the part along k stays, and the rest r' becomes c r' + s (k x r).
         """
         k = self._direction
         along = r[0].times(k[0]) + r[1].times(k[1]) + r[2].times(k[2])
-        turned = []
-        for i in range(3):
-            m, n = (i + 1) % 3, (i + 2) % 3
-            own = along.times(k[i])
-            turned.append(own + c * (r[i] - own) + s * (r[n].times(k[m]) - r[m].times(k[n])))
-        return turned[0], turned[1], turned[2]
+        own = along.times(k)
+        across = r[CYCLE[2]].times(k[CYCLE[1]]) - r[CYCLE[1]].times(k[CYCLE[2]])
+        return own + c * (r - own) + s * across
+
+
+CYCLE = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+"""Axes, the axes after them, and those before them."""
 
 
 # -----------------------------------------------------------------------------
@@ -321,8 +319,9 @@ def rates_along(
     k = np.arange(len(middle))
     posture = np.zeros(len(k), dtype=np.int64)
     velocity, acceleration = np.zeros((2, len(middle), robot.joints))
-    for depth in range(deepest + 1):
-        # The halves overlap a little, so that rounding leaves no gap between them.
+    depth = 0
+    while len(k):
+        # The parts overlap a little, so that rounding leaves no gap between them.
         joints, none = task.joints(k, middle, half * (1 + 1e-12))
         if depth == 0:
             posture = _nearest(joints, none, q)
@@ -332,10 +331,13 @@ def rates_along(
         done = ((fast <= enough[0]) & (sharp <= enough[1])).all(axis=1) | (depth == deepest)
         np.maximum.at(velocity, k[done], fast[done])
         np.maximum.at(acceleration, k[done], sharp[done])
-        k, half = np.repeat(k[~done], 2), np.repeat(half[~done] / 2, 2)
-        middle = np.repeat(middle[~done], 2) + np.tile([-1.0, 1.0], len(k) // 2) * half
-        if not len(k):
-            break
+        # Few spans take as long as many: then two halvings are one step.
+        step = min(2 if 4 * len(k[~done]) <= AT_ONCE else 1, deepest - depth)
+        depth, parts = depth + step, 2**step
+        part = np.arange(1 - parts, parts, 2)
+        half = half[~done] / parts
+        middle = (middle[~done, None] + part * half[:, None]).ravel()
+        k, half = np.repeat(k[~done], parts), np.repeat(half, parts)
     return velocity, acceleration
 
 
@@ -359,39 +361,29 @@ class _Task:
             rows = slice(i, i + AT_ONCE)
             with np.errstate(all="ignore"):
                 time = angle_from(t[rows], half[rows])
-                coefficients = np.moveaxis(self._pieces.external[k[rows]], -1, 0)
-                values = [_polynomial(each, time) for each in coefficients]
+                values = _polynomial(self._pieces.external[k[rows]], time)
                 arm, absent = joints_of(self._robot, self._pose(k[rows], time, values))
-                parts.append(([*arm, *values], absent))
+                external = [values[i] for i in range(len(self._robot.externals))]
+                parts.append(([*arm, *external], absent))
         none = np.concatenate([np.broadcast_to(n, (2, 2, 2, n.shape[-1])) for _, n in parts], -1)
         return [_joined(each) for each in zip(*(joints for joints, _ in parts), strict=True)], none
 
-    def _pose(self, k: Ints, time: Jet, values: list[Jet]) -> Pose:
-        """Return the pose of the model's end over time, with external axes at these values."""
-        pieces, before, after = self._pieces, self._before[..., 0], self._after
-        turn = [_polynomial(pieces.turn[k, :, i], time) for i in range(3)]
-        E = _swung(turn) if pieces.two_angles else _rotation(turn)
-        c, s = time.times(exact(pieces.rate[k])).cos_sin()
-        tip = [
-            _polynomial(pieces.point[k, :, i], time)
-            + c.times(exact(pieces.x[k, i]))
-            + s.times(exact(pieces.y[k, i]))
-            for i in range(3)
-        ]
+    def _pose(self, k: Ints, time: Jet, values: Jet) -> Pose:
+        """Return the pose of the model's end over time, with external axes at values (E, S)."""
+        pieces, before, after = self._pieces, self._before, self._after
+        turn = _polynomial(pieces.turn[k], time)
         R = exact(np.moveaxis(pieces.R[k], 0, -1))
-        columns: list[Column] = []
-        for j in range(4):
-            own = [after[i, j] for i in range(3)]
-            turned = [_sum([E[i][m].times(own[m]) for m in range(3)]) for i in range(3)]
-            inside = [_sum([turned[m].times(R[i, m]) for m in range(3)]) for i in range(3)]
-            if j == 3:
-                inside = [a + b for a, b in zip(inside, tip, strict=True)]
-            column = [_sum([inside[m].times(before[i, m]) for m in range(3)]) for i in range(3)]
-            if j == 3:
-                column = [each.plus(before[i, 3]) for i, each in enumerate(column)]
-            columns.append((column[0], column[1], column[2]))
-        x, y, z, point = self._axes.moved(columns, values)
-        return Pose(x=x, y=y, z=z, point=point)
+        c, s = time.times(exact(pieces.rate[k])).cos_sin()
+        tip = (
+            _polynomial(pieces.point[k], time)
+            + c.times(exact(pieces.x[k].T))
+            + s.times(exact(pieces.y[k].T))
+        )
+        E = _swung(turn) if pieces.two_angles else _rotation(turn)
+        own = [E[:, m, None].times(after[m]) for m in range(3)]
+        inside = _times(R, own[0] + own[1] + own[2]) + tip[:, None].scaled(POINT)
+        columns = _times(before, inside).plus(before[:, 3, None].scaled(POINT))
+        return Pose(self._axes.moved(columns, values))
 
 
 def _nearest(joints: list[Jet], none: Bools, q: Array) -> Ints:
@@ -426,52 +418,62 @@ def _spans(joints: list[Jet], none: Bools, posture: Ints, q: Array) -> tuple[Arr
     return ends[0] + turn, ends[1] + turn
 
 
+def _times(A: Interval, M: Jet) -> Jet:
+    """Return the product of A (3, 3 or more, S) and M (3, 4, S)."""
+    return M[0].times(A[:, 0, None]) + M[1].times(A[:, 1, None]) + M[2].times(A[:, 2, None])
+
+
 def _polynomial(coefficients: Array, time: Jet) -> Jet:
-    """Return c0 + c1 t + c2 t^2 / 2 of coefficients (S, 3)."""
-    c0, c1, c2 = (exact(c) for c in coefficients.T)
+    """Return c0 + c1 t + c2 t^2 / 2 of coefficients (S, 3, D) as jets (D, S)."""
+    c0, c1, c2 = (exact(each) for each in np.moveaxis(coefficients, 0, -1))
     return (time.times(c1) + time.square().times(c2.scaled(0.5))).plus(c0)
 
 
-def _swung(r: list[Jet]) -> list[list[Jet]]:
-    """Return the rotation about z by r_z, and then by the rotation vector (r_x, r_y, 0)."""
+def _swung(r: Jet) -> Jet:
+    """Return the rotation (3, 3, S) about z by r_z, and then by the vector (r_x, r_y, 0)."""
     c, s = r[2].cos_sin()
-    flat = constant(exact(np.zeros_like(r[2].half)), r[2])
-    return [[u * c + v * s, v * c - u * s, w] for u, v, w in _rotation([r[0], r[1], flat])]
+    E = _rotation(r.scaled([[1.0], [1.0], [0.0]]))
+    u, v, w = (E[:, j, None] for j in range(3))
+    return joined([u * c + v * s, v * c - u * s, w], axis=1)
 
 
-def _rotation(r: list[Jet]) -> list[list[Jet]]:
-    """Return the rotation by a rotation vector: 1 + a [r] + b [r]^2 (Rodrigues)."""
-    squares = [each.square() for each in r]
-    size2 = squares[0] + squares[1] + squares[2]
-    a, b = _series(size2, 1), _series(size2, 2)
-    x, y, z = r
-    ax, ay, az = (a * each for each in r)
-    one = constant(exact(np.ones_like(size2.half)), size2)
-    xy, xz, yz = (b * (u * v) for u, v in ((x, y), (x, z), (y, z)))
-    xx, yy, zz = (b * each for each in squares)
-    return [
-        [one - (yy + zz), xy - az, xz + ay],
-        [xy + az, one - (xx + zz), yz - ax],
-        [xz - ay, yz + ax, one - (xx + yy)],
-    ]
+def _rotation(r: Jet) -> Jet:
+    """Return the rotation (3, 3, S) by a vector r (3, S): 1 + a [r] + b [r]^2 (Rodrigues)."""
+    squares = r.square()
+    a, b = _series(squares[0] + squares[1] + squares[2])
+    product = b * (r * r[CYCLE[1]])  # xy, yz, zx
+    turned = a * r[CYCLE[2]]  # z, x, y
+    squares = b * squares
+    diagonal = (-(squares[CYCLE[1]] + squares[CYCLE[2]])).plus(exact(1.0))
+    parts = joined([diagonal, product + turned, product - turned])
+    return parts[np.array([[0, 6, 5], [3, 1, 7], [8, 4, 2]])]
 
 
-def _series(s: Jet, first: int) -> Jet:
-    """Return the sum over k of (-s)^k / (2 k + first)!: sin(x) / x or (1 - cos x) / x^2 of x^2."""
-    out = constant(exact(np.zeros_like(s.half)), s)
-    for k in reversed(range(TERMS)):
-        term = exact(1.0) / exact(float(factorial(2 * k + first)))
-        out = (out * -s).plus(term)
+def _series(s: Jet) -> tuple[Jet, Jet]:
+    """Return sin(x) / x and (1 - cos x) / x^2 of x^2 = s: sums of (-s)^k / (2 k + 1 or 2)!."""
+    out = constant(exact(np.zeros((2, len(s.half)))), s)
+    for k in reversed(range(_terms(s.value.hi.max()))):
+        out = (out * -s).plus(exact(1.0) / exact([[factorial(2 * k + 1)], [factorial(2 * k + 2)]]))
     # By the chain rule the derivatives of the remainder contain those of s.
     off = CUT_OFF * np.maximum(1.0, s.rate.magnitude() ** 2 + s.bend.magnitude())
     rest = Interval(-off, off)
-    return Jet(
+    whole = Jet(
         out.at + rest, out.slope + rest, out.value + rest, out.rate + rest, out.bend + rest, s.half
     )
+    return whole[0], whole[1]
 
 
-def _sum(jets: list[Jet]) -> Jet:
-    return jets[0] + jets[1] + jets[2]
+def _terms(largest: float) -> int:
+    """Return how many terms leave a remainder of `CUT_OFF` up to this value of x^2.
+
+    From the third on, the terms and their first two derivatives fall to less than a third each;
+    those of the first left out are at most n^2 / (2 n + 1)! times a power of x^2.
+    """
+    for n in range(3, TERMS):
+        power = max(largest ** (n - 2), largest**n)
+        if 1.5 * n * n * power <= CUT_OFF * factorial(2 * n + 1):
+            return n
+    return TERMS
 
 
 def _joined(jets: tuple[Jet, ...]) -> Jet:

@@ -34,22 +34,33 @@ MIRRORED = Interval(np.array([[0.0], [HALF_TURN.lo]]), np.array([[0.0], [HALF_TU
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Pose of the model's end in the model's base as the tool turns; jets (C,).
+    """Pose of the model's end in the model's base as the tool turns.
 
     Parameters
     ----------
-    point : tuple of 3 Jet
-        A point on the last axis where the wrist's axes meet, m.
-    x, y, z : tuple of 3 Jet
-        The axes of the end.
+    columns : Jet (3, 4, C)
+        The axes of the end, and a point on the last axis where the wrist's axes meet, m.
     """
 
-    point: tuple[Jet, Jet, Jet]
-    x: tuple[Jet, Jet, Jet]
-    y: tuple[Jet, Jet, Jet]
-    z: tuple[Jet, Jet, Jet]
+    columns: Jet
 
     __repr__ = short_repr
+
+    @property
+    def x(self) -> Jet:
+        return self.columns[:, 0]
+
+    @property
+    def y(self) -> Jet:
+        return self.columns[:, 1]
+
+    @property
+    def z(self) -> Jet:
+        return self.columns[:, 2]
+
+    @property
+    def point(self) -> Jet:
+        return self.columns[:, 3]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +86,7 @@ def _shoulder(pose: Pose, aside: float, side: Array) -> tuple[Jet, Jet, Bools]:
 
     The wrist point is `aside` m off the plane; `side` is 1 where it is ahead and -1 where behind.
     """
-    x, y, _ = pose.point
+    x, y = pose.point[0], pose.point[1]
     ahead2 = (x.square() + y.square()).plus(-exact(aside).square())
     ahead = ahead2.sqrt().scaled(side)
     return argument(x, y) - argument(ahead, constant(exact(aside), x)), ahead, ahead2.value.hi < 0
