@@ -41,15 +41,15 @@ def test_output_that_cannot_be_written_is_one_line(line, said):
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("reader", ["true", "head -0", "head -1"])
 @pytest.mark.parametrize(
     ("words", "code"), [("robots", 0), ("robots --json", 0), ("--help", 0), ("robots none", 2)]
 )
-def test_a_command_keeps_its_exit_code_when_nobody_reads(words, code, reader):
-    done = shell(f"kerfpath {words} | {reader}; exit ${{PIPESTATUS[0]}}")
-    assert done.returncode == code
-    assert done.stderr.count("\n") == (code > 0)
-    for nowhere in ("2>&-", "2> /dev/full", f"2> >({reader})"):
+def test_a_command_keeps_its_exit_code_when_nobody_reads(words, code):
+    for reader in ("true", "head -0", "head -1"):
+        done = shell(f"kerfpath {words} | {reader}; exit ${{PIPESTATUS[0]}}")
+        assert done.returncode == code
+        assert done.stderr.count("\n") == (code > 0)
+    for nowhere in ("2>&-", "2> /dev/full", "2> >(true)", "2> >(head -0)"):
         assert shell(f"kerfpath {words} {nowhere} > /dev/null").returncode == code
 
 

@@ -22,6 +22,7 @@ from kerfpath.job import read_job, read_plan_file
 from kerfpath.study import pareto_of_job, plan_picked, read_pick, write_pareto
 
 CRITERIA = ("displacement", "velocity", "range_6")
+RUNS = 16
 TABLES = (
     HEAD
     + """\
@@ -36,7 +37,7 @@ name = "large"
 speed_m_min = 3
 spacing_mm = 2
 [plan]
-gamma_step_deg = 2
+gamma_step_deg = 4
 posture = "front/up"
 eta_velocity = 0.9
 eta_acceleration = 0.8
@@ -57,7 +58,7 @@ def job(tmp_path_factory):
 @pytest.fixture(scope="module")
 def studied(job, tmp_path_factory):
     store = tmp_path_factory.mktemp("store") / "pareto.sqlite"
-    return pareto_of_job(job, store=store, criteria=CRITERIA, runs=24, processes=2)
+    return pareto_of_job(job, store=store, criteria=CRITERIA, runs=RUNS, processes=2)
 
 
 def rows(store):
@@ -78,7 +79,7 @@ def test_the_front_is_that_of_the_planner_itself(job, studied):
         speed=task.speed,
         options=read.options,
         criteria=CRITERIA,
-        runs=24,
+        runs=RUNS,
     )
     assert studied.contour == "large", "the longest"
     assert studied.others == ("small",)
@@ -95,7 +96,7 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(job, studied, tmp_
     script.write_text(
         "from pathlib import Path\nfrom kerfpath.study import pareto_of_job\n"
         f"if __name__ == '__main__':\n    pareto_of_job(Path({str(job)!r}), store=Path("
-        f"{str(store)!r}), criteria={CRITERIA!r}, runs=24, processes=2)\n"
+        f"{str(store)!r}), criteria={CRITERIA!r}, runs={RUNS}, processes=2)\n"
     )
     process = subprocess.Popen([sys.executable, str(script)])
     deadline = time.monotonic() + 60
@@ -111,14 +112,14 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(job, studied, tmp_
         job,
         store=store,
         criteria=CRITERIA,
-        runs=24,
+        runs=RUNS,
         processes=1,
         progress=lambda what, done, total: told.append((done, total)),
     )
     tried = studied.front.tried  # refinements after the last run count, too
     assert told[-1] == (tried, tried)
     assert all(done <= total for done, total in told)
-    assert before <= rows(store)[0] == tried >= 24, "nothing was done twice"
+    assert before <= rows(store)[0] == tried >= RUNS, "nothing was done twice"
     np.testing.assert_array_equal(again.front.values, studied.front.values)
 
 
@@ -142,7 +143,7 @@ def test_a_cluster_comes_to_the_same_though_a_worker_is_killed(
         job,
         store=tmp_path / "s",
         criteria=CRITERIA,
-        runs=24,
+        runs=RUNS,
         scheduler=scheduler,
         progress=kill,
     )
@@ -254,7 +255,7 @@ def test_a_front_that_is_not_of_this_job_is_refused(job, studied, tmp_path, spoi
 
 def test_a_plan_that_is_not_on_the_front_is_refused(job, studied, tmp_path):
     write_pareto(studied, tmp_path)
-    beaten = next(n for n in range(24) if n not in studied.front.numbers)
+    beaten = next(n for n in range(RUNS) if n not in studied.front.numbers)
     for which in (str(beaten), "best", "²"):
         with pytest.raises(InputError, match="or a plan of the front: "):
             read_pick(tmp_path, job, which)
