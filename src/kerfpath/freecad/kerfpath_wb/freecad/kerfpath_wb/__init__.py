@@ -5,6 +5,17 @@
 
 import os
 
+try:
+    from FreeCAD import Qt
+except ImportError:  # outside FreeCAD texts are as they are
+
+    def translate(context, text):
+        return text
+
+    QT_TRANSLATE_NOOP = translate
+else:
+    translate, QT_TRANSLATE_NOOP = Qt.translate, Qt.QT_TRANSLATE_NOOP
+
 VERSION = "0.1.0"
 """Of this workbench and of the kerfpath that it speaks to; also in package.xml."""
 HERE = os.path.dirname(os.path.abspath(__file__))

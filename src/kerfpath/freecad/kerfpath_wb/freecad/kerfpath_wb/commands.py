@@ -12,8 +12,17 @@ try:
 except ImportError:  # FreeCAD 0.20 and 0.21 have them all in QtGui
     QtWidgets = QtGui
 
-from . import VERSION, geometry, icon, objects, panel, process, session
-from .panel import tr
+from . import (
+    QT_TRANSLATE_NOOP,
+    VERSION,
+    geometry,
+    icon,
+    objects,
+    panel,
+    process,
+    session,
+    translate,
+)  # fmt: skip
 
 TOOLBAR = [
     "Kerfpath_Cut",
@@ -35,13 +44,15 @@ def tell(text, install=False):
     """Show a message, which may offer to install kerfpath; it does not wait for an answer."""
     App.Console.PrintWarning("kerfpath: {}\n".format(text))
     box = QtWidgets.QMessageBox(Gui.getMainWindow())
-    box.setWindowTitle(tr("Kerfpath"))
+    box.setWindowTitle(translate("kerfpath", "Kerfpath"))
     box.setText(text)
     box.setModal(False)
     box.setAttribute(QtCore.Qt.WA_DeleteOnClose)
     box.addButton(QtWidgets.QMessageBox.Close)
     if install:
-        button = box.addButton(tr("Install kerfpath"), QtWidgets.QMessageBox.AcceptRole)
+        button = box.addButton(
+            translate("kerfpath", "Install kerfpath"), QtWidgets.QMessageBox.AcceptRole
+        )
         button.clicked.connect(install_kerfpath)
     boxes[:] = [box]
     box.show()
@@ -58,7 +69,9 @@ class _Installation(QtCore.QObject):
 
     def __init__(self):
         super().__init__()
-        self.done.connect(lambda said: tell(said or tr("kerfpath is installed; go on")))
+        self.done.connect(
+            lambda said: tell(said or translate("kerfpath", "kerfpath is installed; go on"))
+        )
         threading.Thread(target=self._work, daemon=True).start()
 
     def _work(self):
@@ -73,7 +86,12 @@ class _Installation(QtCore.QObject):
 def install_kerfpath():
     """Install kerfpath in an environment of the workbench, which takes some minutes."""
     global installation
-    tell(tr("Installing kerfpath; this takes some minutes. A message says when it is done."))
+    tell(
+        translate(
+            "kerfpath",
+            "Installing kerfpath; this takes some minutes. A message says when it is done.",
+        )
+    )
     installation = _Installation()
 
 
@@ -104,11 +122,13 @@ def picked():
         picks += names
     if not found:
         raise geometry.PickError(
-            tr("nothing to cut is picked: pick edges or faces of the part first")
+            translate("kerfpath", "nothing to cut is picked: pick edges or faces of the part first")
         )
     if len(found) > 1:
         labels = " and ".join(each.Label for each in found)
-        raise geometry.PickError(tr("edges of one part are cut at a time, got those of ") + labels)
+        raise geometry.PickError(
+            translate("kerfpath", "edges of one part are cut at a time, got those of ") + labels
+        )
     return found[0], picks
 
 
@@ -166,8 +186,8 @@ class _Command:
     def GetResources(self):
         return {
             "Pixmap": icon(self.NAME),
-            "MenuText": tr(self.MENU),
-            "ToolTip": tr(self.TIP),
+            "MenuText": translate("kerfpath", self.MENU),
+            "ToolTip": translate("kerfpath", self.TIP),
             "Accel": self.KEYS,
         }
 
@@ -184,8 +204,11 @@ class _Command:
 class Cut(_Command):
     """Contours of what is picked."""
 
-    NAME, MENU, KEYS = "contour", "Cut what is picked", "K, C"
-    TIP = "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
+    NAME, KEYS = "contour", "K, C"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Cut what is picked")
+    TIP = QT_TRANSLATE_NOOP(
+        "kerfpath", "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
+    )
 
     def run(self):
         part, names = picked()
@@ -197,9 +220,12 @@ class Cut(_Command):
         job = session.job_of(part.Document)
         if job is not None and job.Part != part:
             raise geometry.PickError(
-                tr("the job of this document cuts {}, picked is {}; pick an edge of the first, or "
-                   "delete the job").format(job.Part.Label, part.Label)
-            )  # fmt: skip
+                translate(
+                    "kerfpath",
+                    "the job of this document cuts {}, picked is {}; pick an edge of the first, or "
+                    "delete the job",
+                ).format(job.Part.Label, part.Label)
+            )
         Gui.Selection.clearSelection()
         found = _at_work(part.Document, part)
         if found is not None:
@@ -210,8 +236,12 @@ class Cut(_Command):
 class Line(Cut):
     """Open lines of the picked edges."""
 
-    NAME, MENU, KEYS = "line", "Cut these edges only", "K, L"
-    TIP = "Cut the picked edges from end to end; a face that is picked, too, says from which side"
+    NAME, KEYS = "line", "K, L"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Cut these edges only")
+    TIP = QT_TRANSLATE_NOOP(
+        "kerfpath",
+        "Cut the picked edges from end to end; a face that is picked, too, says from which side",
+    )
 
     def run(self):
         part, names = picked()
@@ -222,8 +252,9 @@ class Line(Cut):
 class Remove(_Command):
     """Contours taken out of the job."""
 
-    NAME, MENU, KEYS = "remove", "Do not cut", "K, R"
-    TIP = "Take the selected contours out of the job"
+    NAME, KEYS = "remove", "K, R"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Do not cut")
+    TIP = QT_TRANSLATE_NOOP("kerfpath", "Take the selected contours out of the job")
 
     def IsActive(self):
         return bool(App.ActiveDocument and contours_picked())
@@ -242,8 +273,12 @@ class _JobCommand(_Command):
 class Fixture(_JobCommand):
     """What the robot keeps clear of."""
 
-    NAME, MENU, KEYS = "fixture", "Keep clear of it", "K, F"
-    TIP = "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions"
+    NAME, KEYS = "fixture", "K, F"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Keep clear of it")
+    TIP = QT_TRANSLATE_NOOP(
+        "kerfpath",
+        "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions",
+    )
 
     def run(self):
         job = session.job_of(App.ActiveDocument)
@@ -252,10 +287,12 @@ class Fixture(_JobCommand):
             if hasattr(each, "Shape") and each.Shape.Solids and each != job.Part
         ]  # fmt: skip
         if not chosen:
-            raise geometry.PickError(tr("select solids other than the part first"))
+            raise geometry.PickError(
+                translate("kerfpath", "select solids other than the part first")
+            )
         left = [each for each in job.Fixtures if each not in chosen]
         new = [each for each in chosen if each not in job.Fixtures]
-        job.Document.openTransaction("Kerfpath: Fixtures")
+        job.Document.openTransaction(translate("kerfpath", "Kerfpath: Fixtures"))
         job.Fixtures = left + new
         job.Document.commitTransaction()
         _at_work(job.Document, job.Part)
@@ -264,8 +301,9 @@ class Fixture(_JobCommand):
 class Plan(_JobCommand):
     """The panel of the job."""
 
-    NAME, MENU, KEYS = "kerfpath", "Plan and play", "K, P"
-    TIP = "Show the panel of the job: plan, play, settings, program"
+    NAME, KEYS = "kerfpath", "K, P"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Plan and play")
+    TIP = QT_TRANSLATE_NOOP("kerfpath", "Show the panel of the job: plan, play, settings, program")
 
     def run(self):
         open_panel(session.job_of(App.ActiveDocument))
@@ -274,8 +312,9 @@ class Plan(_JobCommand):
 class Program(_Command):
     """The program, written."""
 
-    NAME, MENU, KEYS = "program", "Write the program", "K, W"
-    TIP = "Write the audited program, the job and the drawing"
+    NAME, KEYS = "program", "K, W"
+    MENU = QT_TRANSLATE_NOOP("kerfpath", "Write the program")
+    TIP = QT_TRANSLATE_NOOP("kerfpath", "Write the audited program, the job and the drawing")
 
     def IsActive(self):
         found = session.running(App.ActiveDocument) if App.ActiveDocument else None

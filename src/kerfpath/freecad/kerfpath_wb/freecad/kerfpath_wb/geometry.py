@@ -5,6 +5,8 @@ Lengths are in mm. Nothing here needs FreeCAD; edges are its edges, or anything 
 
 import math
 
+from . import translate
+
 NEAR = 1e-3
 """mm: places and lengths this near are the same, for `same`; beside a millionth of the length."""
 SAMPLES = 9
@@ -86,17 +88,25 @@ def found_again(names, prints, edges):
             continue
         alike = [i for i, each in enumerate(now) if same(before, each)]
         if len(alike) != 1:
+            gone = index < 0 or index >= len(now)
             other = (
-                "it is gone"
-                if index < 0 or index >= len(now)
-                else "it is now a " + said(now[index])
+                translate("kerfpath", "it is gone")
+                if gone
+                else translate("kerfpath", "it is now a {}").format(said(now[index]))
+            )
+            many = (
+                translate("kerfpath", "several edges are as it was")
+                if alike
+                else translate("kerfpath", "no edge is as it was")
             )
             raise PickError(
-                "the model has changed: {} was a {}, {}, and {}; pick the contour again".format(
-                    name, said(before), other,
-                    "no edge is as it was" if not alike else "several edges are as it was",
+                translate(
+                    "kerfpath",
+                    "the model has changed: {} was a {}, {}, and {}; pick the contour again",
+                ).format(
+                    name, said(before), other if gone else other.format(said(now[index])), many
                 )
-            )  # fmt: skip
+            )
         found.append("Edge{}".format(alike[0] + 1))
     return found
 
@@ -130,14 +140,17 @@ def chains(names, ends):
         for point in ends[i]:
             if len(at(point, every)) > 2:
                 beside = sorted({names[k] for k, _ in at(point, every)})
-                raise PickError("{} meet at one point; cut one line at a time".format(
-                    ", ".join(beside)))  # fmt: skip
+                raise PickError(
+                    translate("kerfpath", "{} meet at one point; cut one line at a time").format(
+                        ", ".join(beside)
+                    )
+                )
     found, left = [], list(every)
     while left:
         free = [(i, bool(end)) for i in left for end in (0, 1) if len(at(ends[i][end], every)) == 1]
         if not free:
             raise PickError(
-                "{} are a whole loop; take Cut what is picked".format(
+                translate("kerfpath", "{} are a whole loop; take Cut what is picked").format(
                     ", ".join(names[i] for i in left)
                 )
             )
@@ -236,8 +249,10 @@ def edges_on(loop, edges):
     length = sum(edge.Length for edge in on.values())
     if length < WHOLE * loop.length:
         raise PickError(
-            "only {:.4g} of the {:.4g} mm of loop {} are edges of the model; pick another "
-            "one".format(length, loop.length, loop.name)
+            translate(
+                "kerfpath",
+                "only {:.4g} of the {:.4g} mm of loop {} are edges of the model; pick another one",
+            ).format(length, loop.length, loop.name)
         )
     return ["Edge{}".format(i + 1) for i in on]
 
@@ -265,8 +280,11 @@ def loops_of(groups, loops):
             found.append([loop for loop in loops if all(map(loop.has, points))])
         if not any(found):
             raise PickError(
-                "{} is on no loop that can be cut from outside; pick an edge of the outer side "
-                "of the part".format(name)
+                translate(
+                    "kerfpath",
+                    "{} is on no loop that can be cut from outside; pick an edge of the outer side "
+                    "of the part",
+                ).format(name)
             )
         on.update(((name, i), each) for i, each in enumerate(found) if each)
     picked = {}
@@ -279,8 +297,11 @@ def loops_of(groups, loops):
         likely = [loop for loop in candidates if rank(loop) == best]
         if len(likely) > 1:
             raise PickError(
-                "{} is on {}; pick the face whose edge is to be cut, or another edge of the "
-                "loop, too".format(name, " and on ".join(sorted(loop.name for loop in likely)))
+                translate(
+                    "kerfpath",
+                    "{} is on {}; pick the face whose edge is to be cut, or another edge of the "
+                    "loop, too",
+                ).format(name, " and on ".join(sorted(loop.name for loop in likely)))
             )
         picked[likely[0].name] = likely[0]
     return list(picked.values())

@@ -18,6 +18,8 @@ import threading
 from collections import deque
 from urllib.parse import parse_qs, urlsplit
 
+from . import translate
+
 FOREIGN = ("PYTHON", "LD_LIBRARY_PATH", "QT_", "SSL_CERT", "FONTCONFIG_")
 """Beginnings of the variables by which FreeCAD would lead another Python astray."""
 LAST_LINES = 30
@@ -60,7 +62,7 @@ def command_of(path):
     if os.path.isdir(path):
         path = os.path.join(path, *PYTHON)
     if not os.path.isfile(path):
-        raise ProcessError("there is no kerfpath at {}".format(path))
+        raise ProcessError(translate("kerfpath", "there is no kerfpath at {}").format(path))
     if os.path.basename(path).lower().startswith("python"):
         return [path, "-I", "-m", "kerfpath"]
     return [path]
@@ -100,7 +102,9 @@ def find(preference="", written="", own="", variables=None):
             try:
                 return command_of(path)
             except ProcessError as error:
-                raise ProcessError("{}, which {}; correct it".format(error, who)) from None
+                raise ProcessError(
+                    translate("kerfpath", "{}, which {}; correct it").format(error, who)
+                ) from None
     home = os.path.expanduser("~")
     on_path = shutil.which("kerfpath", path=clean_path(given.get("PATH", "")))
     guesses = [on_path, os.path.join(home, ".local", "bin", "kerfpath")]
@@ -109,8 +113,11 @@ def find(preference="", written="", own="", variables=None):
         if os.path.exists(path):
             return command_of(path)
     raise ProcessError(
-        "kerfpath is not found on PATH, in ~/.local/bin or in the workbench's own environment; "
-        "install it with the button, or run `kerfpath freecad` in the environment that has it"
+        translate(
+            "kerfpath",
+            "kerfpath is not found on PATH, in ~/.local/bin or in the workbench's own environment; "
+            "install it with the button, or run `kerfpath freecad` in the environment that has it",
+        )
     )
 
 
@@ -141,8 +148,11 @@ def installation(folder, requirement, variables=None):
                 [python, "-I", "-m", "pip", "install", requirement],
             ]
     raise ProcessError(
-        "to install kerfpath, uv or a Python of version {} or newer with venv is needed, and none "
-        "is on PATH; install uv (https://docs.astral.sh/uv) and try again".format(oldest)
+        translate(
+            "kerfpath",
+            "to install kerfpath, uv or a Python of version {} or newer with venv is needed, and "
+            "none is on PATH; install uv (https://docs.astral.sh/uv) and try again",
+        ).format(oldest)
     )
 
 
@@ -167,7 +177,9 @@ def install(folder, requirement):
             said = " ".join(done.stdout.strip().splitlines()[-3:])
             shutil.rmtree(folder, ignore_errors=True)
             raise ProcessError(
-                "{} has failed: {}".format(os.path.basename(command[0]) + " " + command[1], said)
+                translate("kerfpath", "{} has failed: {}").format(
+                    os.path.basename(command[0]) + " " + command[1], said
+                )
             )
 
 
@@ -204,7 +216,9 @@ class Studio:
             )  # fmt: skip
         except OSError as error:
             raise ProcessError(
-                "{} cannot be started ({})".format(command[0], error.strerror)
+                translate("kerfpath", "{} cannot be started ({})").format(
+                    command[0], error.strerror
+                )
             ) from None
         self._errors = threading.Thread(target=self._collect, daemon=True)
         self._errors.start()
@@ -245,7 +259,9 @@ class Studio:
         try:
             answer, content = self._request(path, {"Cookie": self._cookie})
         except (OSError, http.client.HTTPException) as error:
-            raise ProcessError("kerfpath does not answer ({})".format(error)) from None
+            raise ProcessError(
+                translate("kerfpath", "kerfpath does not answer ({})").format(error)
+            ) from None
         if answer.status != 200:
             raise ProcessError(content.decode("utf-8", "replace").strip())
         return content
@@ -356,7 +372,11 @@ class Studio:
         magic = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455, section 1.3
         expected = base64.b64encode(hashlib.sha1((key + magic).encode()).digest())
         if b" 101 " not in status or accept != expected:
-            raise ProcessError("kerfpath has refused the connection: {}".format(status.decode()))
+            raise ProcessError(
+                translate("kerfpath", "kerfpath has refused the connection: {}").format(
+                    status.decode()
+                )
+            )
         connection.settimeout(None)
         with self._lock:
             self._socket = connection
