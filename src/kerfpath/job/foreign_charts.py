@@ -238,9 +238,7 @@ def _of_qtplasmac(
         material = usual.get("material")
         if material is None:
             bare = _THICK.sub("", name)
-            material = (
-                re.sub(r"\b\d+(\.\d+)?\s*A\b", "", bare, flags=re.ASCII).strip(" -,_") or None
-            )
+            material = _AMPS.sub("", bare).strip(" -,_") or None
             if material is not None:
                 made.notes.append(f"[{section}]: material {material!r} is taken from its name")
         remarks = [name] if name else []
@@ -312,10 +310,6 @@ def _sections(file: Path, text: str) -> dict[str, dict[str, tuple[str, int]]]:
     if not found:
         raise InputError(f"{file}: expected sections [MATERIAL_NUMBER_n], got none")
     return found
-
-
-def _unlike(where: str, expected: str, got: str) -> InputError:
-    return InputError(f"{where}: expected {expected}, got {got[:40]!r}; remove it")
 
 
 # -----------------------------------------------------------------------------

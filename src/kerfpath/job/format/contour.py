@@ -44,7 +44,7 @@ from kerfpath.windows import GammaWindow
 MM = 1e-3
 ROUNDED = 1e-3
 """Share by which a hole may be larger than the size of small holes, for chords of its line."""
-OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+OTHER_SIDE: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
 def keys_of_closed_loops(table: ContourTable) -> dict[str, str]:
@@ -77,7 +77,7 @@ def shape_contour(table: ContourTable, drawn: Contour, surface: Surface | None) 
 def _run(
     table: ContourTable, contour: Contour, surface: Surface | None, *, backwards: bool
 ) -> list[Contour]:
-    scrap: Side = OTHER[table.scrap] if backwards else table.scrap
+    scrap: Side = OTHER_SIDE[table.scrap] if backwards else table.scrap
     contour = reverse(contour) if backwards else contour
     if table.smooth_axes is not None:
         contour = smooth_axes(

@@ -16,9 +16,9 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.as_run import keeps_between_nodes
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob, pose
-from kerfpath.job.format.cell import SHAPES
+from kerfpath.job.format.cell import SHAPES, SIZES
+from kerfpath.job.format.contour import OTHER_SIDE
 from kerfpath.job.format.tables import CellTable, given
-from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
 from kerfpath.post import ProgramOptions
 from kerfpath.robots import robot as robot_of
@@ -28,12 +28,6 @@ from kerfpath.tolerances import SAME_PLACE
 
 # -----------------------------------------------------------------------------
 # Write the cell of a job as lines of a Python script.
-
-SIZES = (
-    "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
-)  # fmt: skip
-"""Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
-
 
 def has_files(table: CellTable) -> bool:
     """Return whether anything in a cell except the part is read from a file."""
@@ -107,7 +101,6 @@ ANGLES = {"angle", "lower", "upper", "velocity", "acceleration"} | {
     if each.kind is float and each.unit == "deg"
 }
 """Arguments in rad, rad/s and rad/s^2, which are written in degrees if that loses no digit."""
-OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Reversals", "Tilt")
 """Names that the planning options may use."""
 OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "cylinder", "link_capsules", "thicken", "weld")
@@ -365,7 +358,7 @@ def _operations(task: ContourSpec, part: Part) -> Iterator[str]:
     """Yield the operations on a loop in their order, see `ContourSpec.candidates`."""
     table = task.table
     back = table.direction == "reversed"
-    scrap = OTHER[table.scrap] if back else table.scrap
+    scrap = OTHER_SIDE[table.scrap] if back else table.scrap
     corners, surface = table.corners, "surface=surface"
     if back:
         yield "reverse(path)"
