@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
-from kerfpath.cli.first_job import first_job
+from kerfpath.cli.drawing_output import first_job
 from kerfpath.job import foresee, prepare, read_job, run_prepared
 from studio.talk import write_job
 

@@ -222,8 +222,7 @@ def new(
 
     Example: kerfpath new door.step --robot kuka_kr30_ha
     """
-    from kerfpath.cli.drawing_output import drawing_by
-    from kerfpath.cli.first_job import write_new
+    from kerfpath.cli.drawing_output import drawing_by, write_new
 
     how = drawing_by(
         drawing,
@@ -283,8 +282,8 @@ def check(job: JobArgument, as_json: Json = False) -> None:
 
     Example: kerfpath check door.toml
     """
-    from kerfpath.cli.check_output import show_check
     from kerfpath.cli.drawing_output import drawing_of, show_drawing
+    from kerfpath.cli.plan_output import show_check
     from kerfpath.job import check_job, prepare, read_job, require_foreseen
 
     read = read_job(job)

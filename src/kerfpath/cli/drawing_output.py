@@ -1,4 +1,4 @@
-"""Output about a drawing: its summary in one line, and the loops that `kerfpath contours` lists."""
+"""Output about a drawing: its summary, the loops of `kerfpath contours`, and its first job."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.arrays import counted
-from kerfpath.cad import Loop, Part
+from kerfpath.cad import Loop, Part, read
 from kerfpath.cli.show import busy, out, print_json, progress_bars, show_files, table
-from kerfpath.job import Drawing, Job, machine_of
+from kerfpath.errors import InputError
+from kerfpath.files import write_whole
+from kerfpath.job import Drawing, Job, job_text, machine_of
 from kerfpath.post import write_program
 from kerfpath.report import DrawnLoop, render_drawing
 
@@ -230,3 +232,55 @@ def _contours_entry(part: Part, html: Path | None) -> dict[str, object]:
             for loop in part.loops
         ],
     }
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath new`: write a first job for a drawing; `kerfpath studio` does so for one without.
+
+
+def write_new(drawing: Drawing, job: Path | None, *, robot: str | None = None) -> None:
+    """Write a first job for a drawing, and print what it has and what to do next.
+
+    Raises
+    ------
+    InputError
+        There is a job already, or as `first_job`.
+    """
+    job = job or drawing.file.with_suffix(".toml")
+    if job.exists():
+        raise InputError(
+            f"{job}: there is a file already, which is never overwritten; give another name with "
+            "--out, or delete it"
+        )
+    part = drawn(drawing)
+    text = job_text(part, job, robot=robot, drawing=drawing)
+    _write(job, text)
+    print_json({"job": str(job), "drawing": str(drawing.file), "text": text})
+    show_drawing(part)
+    out.print(f"wrote {escape(str(job))}; now change what is marked as a guess there, then:")
+    out.print(f"  kerfpath check {escape(str(job))}", highlight=False)
+    out.print(f"  kerfpath plan {escape(str(job))}")
+
+
+def first_job(drawing: Path) -> Path:
+    """Return the job beside a drawing with the same name; write one if there is none.
+
+    Raises
+    ------
+    InputError
+        The drawing cannot be read; the job cannot be written.
+    """
+    job = drawing.with_suffix(".toml")
+    if not job.exists():
+        _write(job, job_text(read(drawing), job))
+    return job
+
+
+def _write(job: Path, text: str) -> None:
+    try:
+        write_whole({job: text.encode()})
+    except OSError as error:
+        raise InputError(
+            f"{job}: cannot write a job for the drawing ({error.strerror}); copy the drawing to "
+            "a writable folder"
+        ) from None

@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from kerfpath import __version__
 from kerfpath.cad import SUFFIXES
-from kerfpath.cli.first_job import first_job
+from kerfpath.cli.drawing_output import first_job
 from kerfpath.cli.show import out
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra

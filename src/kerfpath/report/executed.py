@@ -1,4 +1,4 @@
-"""The path as it is executed beside the one that is drawn, of one contour of a report."""
+"""How a contour of a report is executed: its path beside the one that is drawn, and its power."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import plotly.graph_objects as go
 
 from kerfpath.arrays import Array, short_repr, spread
 from kerfpath.report.style import ACCENT, CHOSEN, FAINT, INK, axis, axis_title, base_layout, short
+
+# -----------------------------------------------------------------------------
+# The path as it is executed beside the one that is drawn.
 
 HEIGHT, SCENE_HEIGHT = 220, 420
 MOST_POINTS = 1500
@@ -129,3 +132,66 @@ def _camera(points: Array) -> dict[str, Any]:
     up = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.9 else {"x": 0, "y": 0, "z": 1}
     x, y, z = (float(f"{value:.3g}") for value in eye)
     return {"eye": {"x": x, "y": y, "z": z}, "up": up}
+
+
+# -----------------------------------------------------------------------------
+# The power of the beam and the speed of the tip along the way.
+
+POWER_HEIGHT = 240
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PowerPath:
+    """The power along a cut of m moves, in shares of the full power and of the programmed speed.
+
+    Parameters
+    ----------
+    s : (m+1,) m
+        Length of the way up to each target.
+    set : (m,)
+        The power that the program sets in each move.
+    fine_s : (k,) m
+        Length of the way at samples.
+    speed, asked : (k,)
+        Executed speed there, and the power by it.
+    facts : sequence of (what, value)
+        Rows in words.
+    """
+
+    s: Array
+    set: Array
+    fine_s: Array
+    speed: Array
+    asked: Array
+    facts: tuple[tuple[str, str], ...] = ()
+
+    __repr__ = short_repr
+
+
+def power_along(path: PowerPath) -> go.Figure:
+    """Return the power and the speed along the way, per cent; the power is set at targets."""
+    figure = go.Figure(layout=base_layout(POWER_HEIGHT, hovermode="x unified"))
+    figure.update_layout(
+        margin={"l": 62, "r": 44, "t": 40, "b": 48},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
+    )
+    some = spread(len(path.fine_s), MOST_POINTS)
+    steps = np.append(path.set, path.set[-1:])
+    for name, s, values, colour, shape in (
+        ("speed", path.fine_s[some], path.speed[some], FAINT, "linear"),
+        ("power by the speed", path.fine_s[some], path.asked[some], ACCENT, "linear"),
+        ("power", path.s, steps, CHOSEN, "hv"),
+    ):
+        figure.add_scatter(
+            x=short(s * 1e3),
+            y=short(100 * values),
+            mode="lines",
+            name=name,
+            line={"color": colour, "width": 1.8, "shape": shape},
+            hovertemplate="%{y:.1f} %",
+        )
+    figure.update_layout(
+        xaxis=axis(title=axis_title("length, mm"), unifiedhovertitle={"text": "%{x:.1f} mm"}),
+        yaxis=axis(title=axis_title("share, %"), range=[0, 105]),
+    )
+    return figure

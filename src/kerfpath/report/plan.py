@@ -15,7 +15,7 @@ from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
-from kerfpath.report import executed, maps, motion, power
+from kerfpath.report import executed, maps, motion
 from kerfpath.report.page import FAIL, PASS, WARN, PageKeywords, number, render_page
 from kerfpath.report.scene import scene
 from kerfpath.report.section import ContourSection
@@ -84,7 +84,6 @@ def render(
         measures=MEASURES,
         motion=motion,
         executed=executed,
-        power=power,
         counts_of=_counts,
         hidden_postures=maps.hidden_postures,
         joints_of=_joints,

@@ -17,8 +17,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
-from kerfpath.report.executed import ExecutedPath
-from kerfpath.report.power import PowerPath
+from kerfpath.report.executed import ExecutedPath, PowerPath
 
 SPARE = (0.25, 0.5, 1.0)
 """Upper ends of the ranges of clearance that have colours, as shares of the map's band."""
