@@ -24,7 +24,7 @@ CLOCKS = {
     "read STEP": ("kerfpath.cli.plan_output", "drawing_of"),
     "graph": ("kerfpath.job.format.reading", "layered_graph"),
     "search and refinement": ("kerfpath.planner.continuous", "clear_motion"),
-    "audit": ("kerfpath.job.format.tolerances", "checks"),
+    "audit": ("kerfpath.job.format.tables.job", "checks"),
     "certificate": ("kerfpath.job.run.job", "certified"),
     "program, with its audit": ("kerfpath.job.output.writing", "program_texts"),
     "report": ("kerfpath.job.output.writing", "report_text"),

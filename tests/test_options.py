@@ -21,7 +21,7 @@ from kerfpath import (
     PlanOptions,
     Tilt,
 )
-from kerfpath.job.format.tables.plan import PlanTable
+from kerfpath.job.format.tables.job import PlanTable
 from kerfpath.operations.kerf import Lead, LeadKeywords
 from kerfpath.options import PlanKeywords
 from kerfpath.post.options import ProgramKeywords, ProgramOptions

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from tests.post.cases import CASES
 
-from kerfpath.job.process_sheet import MISSING, check_sheet
+from kerfpath.job.program_file import MISSING, check_sheet
 
 SHEET = (
     "- PROCESS SHEET, set by hand:",

@@ -29,7 +29,7 @@ from kerfpath.crew import Crew
 from kerfpath.effort import thread_count
 from kerfpath.errors import InputError
 from kerfpath.execution import Correction, from_stop_to_stop, lengths_of, run_along
-from kerfpath.job.as_run import checks_of_unknown, run_judged
+from kerfpath.job.as_run import as_programmed, checks_of_unknown, run_judged
 from kerfpath.job.audit_report import (
     SAME_TIME,
     AuditReport,
@@ -40,7 +40,6 @@ from kerfpath.job.audit_report import (
     count_at,
 )
 from kerfpath.job.comparison import compare, compare_jobs
-from kerfpath.job.compensated import as_programmed
 from kerfpath.job.expected import (
     SAME_VALUE,
     Expected,
@@ -61,7 +60,7 @@ from kerfpath.job.format import (
     prepare,
     read_job,
 )
-from kerfpath.job.laser_and_gas import BeamProcess, check_laser_and_gas
+from kerfpath.job.laser_and_gas import BeamProcess, check_laser_and_gas, check_power, without_power
 from kerfpath.job.plan_file import (
     NodesData,
     PlanData,
@@ -70,15 +69,15 @@ from kerfpath.job.plan_file import (
     plan_entry,
     read_plan_file,
 )
-from kerfpath.job.power import check_power, without_power
-from kerfpath.job.process_sheet import check_sheet, with_sheet
 from kerfpath.job.program_file import (
     ReadCut,
     add_tips,
+    check_sheet,
     divide_arcs,
     in_language_of,
     program_on_disk,
     read_cuts,
+    with_sheet,
 )
 from kerfpath.options import EXACT_OR_BETTER
 from kerfpath.plans import Plan, Proof, TransferMove

@@ -14,9 +14,9 @@ from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.execution import with_power
+from kerfpath.job.as_run import as_programmed, programmed
 from kerfpath.job.audit import Audit
 from kerfpath.job.audit_report import AuditReport
-from kerfpath.job.compensated import as_programmed, programmed
 from kerfpath.job.expected import Expected, ExpectedContour, expect_plans
 from kerfpath.job.format import (
     Candidate,

@@ -14,7 +14,7 @@ from kerfpath import cad
 from kerfpath.contour import Contour
 from kerfpath.job import read_job
 from kerfpath.job.run import sides_in_doubt
-from kerfpath.job.run.doubts import both_sides
+from kerfpath.job.run.foresee import both_sides
 
 HEIGHT, WALL = 60.0, 3.0
 

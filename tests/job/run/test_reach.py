@@ -8,7 +8,7 @@ import pytest
 
 from jobs import DEMO, SMALL
 from kerfpath.job import check_job, prepare, read_job, run_job
-from kerfpath.job.run.reach import STEP, _moves, move_into_reach
+from kerfpath.job.run.remedy import STEP, _moves, move_into_reach
 
 
 def placed(folder, xyz):

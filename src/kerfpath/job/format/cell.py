@@ -34,7 +34,7 @@ from kerfpath.errors import InputError
 from kerfpath.job.format.faults import refusal_at
 from kerfpath.job.format.reading import Job
 from kerfpath.job.format.tables import CellTable, FixtureTable, given
-from kerfpath.job.format.values import pose
+from kerfpath.job.format.tables.table import pose
 from kerfpath.tolerances import SAME_PLACE
 from kerfpath.urdf import read_srdf
 

@@ -22,8 +22,8 @@ from kerfpath.job.format.tables import (
     RowTable,
     tables_in,
 )
+from kerfpath.job.format.tables.table import nearest
 from kerfpath.job.format.toml_file import read_tables, read_text
-from kerfpath.job.format.values import nearest
 
 FOLDER = "charts"
 """Folder of charts beside a job, and in the user's folder of settings."""

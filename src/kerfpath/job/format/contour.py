@@ -14,7 +14,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables import ContourTable
 from kerfpath.job.format.tables.part import SAMPLINGS, LeadTable
-from kerfpath.job.format.values import LARGEST, MOST_NODES, SMALLEST
+from kerfpath.job.format.tables.table import LARGEST, MOST_NODES, SMALLEST
 from kerfpath.names import listed
 from kerfpath.operations import (
     Side,

@@ -19,7 +19,7 @@ from kerfpath.job.format.tables import (
     REPEATED,
     TABLES,
 )
-from kerfpath.job.format.values import FAULT, LARGEST, SMALLEST, nearest
+from kerfpath.job.format.tables.table import FAULT, LARGEST, SMALLEST, nearest
 
 # -----------------------------------------------------------------------------
 # Locate keys and values in a TOML text, so that messages can name their line.

@@ -20,7 +20,6 @@ from kerfpath.errors import InputError
 from kerfpath.execution import IDEAL, Correction, Response, read_correction
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
-from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.process import (
     SmallHoles,
@@ -41,11 +40,10 @@ from kerfpath.job.format.tables import (
     MachineTable,
     SequenceTable,
 )
-from kerfpath.job.format.tables.plan import said_in_keys
-from kerfpath.job.format.tables.table import Table
-from kerfpath.job.format.tolerances import Tolerances
+from kerfpath.job.format.tables.job import Tolerances, said_in_keys
+from kerfpath.job.format.tables.part import Drawing
+from kerfpath.job.format.tables.table import Table, nearest
 from kerfpath.job.format.toml_file import read_tables, read_text
-from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, folds, layered_graph
 from kerfpath.post import ProgramOptions, languages

@@ -29,6 +29,7 @@ from kerfpath.tolerances import SAME_PLACE
 # -----------------------------------------------------------------------------
 # Write the cell of a job as lines of a Python script.
 
+
 def has_files(table: CellTable) -> bool:
     """Return whether anything in a cell except the part is read from a file."""
     return table.head.file is not None or any(each.file is not None for each in table.fixture)

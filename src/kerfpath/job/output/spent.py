@@ -16,7 +16,7 @@ import numpy as np
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
 from kerfpath.execution import PowerAlong, power_along
-from kerfpath.job.compensated import programmed
+from kerfpath.job.as_run import programmed
 from kerfpath.job.format import CostTable, Job, JobRowTable, ProcessTable, full_power
 from kerfpath.job.run import CutResult, JobResult
 from kerfpath.post import build_program, laser_start

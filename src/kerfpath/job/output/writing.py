@@ -16,9 +16,8 @@ from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.execution import with_power
 from kerfpath.files import require_replaceable
-from kerfpath.job.as_run import allowed_off
+from kerfpath.job.as_run import allowed_off, compensation_notes
 from kerfpath.job.audit_report import collision_note
-from kerfpath.job.compensated import compensation_notes
 from kerfpath.job.format import DIFFER, SMALL_HOLE, Job, origins_of, refusal_at
 from kerfpath.job.output.spent import power_of, spent_table
 from kerfpath.job.plan_file import (

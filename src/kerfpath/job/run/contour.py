@@ -15,11 +15,9 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, follows_courses, graph_of_runs, plan_run
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.as_run import kept_between_nodes
-from kerfpath.job.compensated import as_programmed
+from kerfpath.job.as_run import as_programmed, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
-from kerfpath.job.run.reach import move_into_reach
-from kerfpath.job.run.remedy import Remedy, find_remedy, opens_without_windows
+from kerfpath.job.run.remedy import Remedy, find_remedy, move_into_reach, opens_without_windows
 from kerfpath.job.run.results import CutResult
 from kerfpath.options import PlanOptions
 from kerfpath.planner import (

@@ -11,8 +11,7 @@ from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.as_run import AsRun
-from kerfpath.job.compensated import programmed
+from kerfpath.job.as_run import AsRun, programmed
 from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.job.run.remedy import Remedy
 from kerfpath.planner import (

@@ -16,12 +16,12 @@ from kerfpath.job.format.tables.job import AuditTable as AuditTable
 from kerfpath.job.format.tables.job import Goal as Goal
 from kerfpath.job.format.tables.job import JobFile as JobFile
 from kerfpath.job.format.tables.job import LayoutTable as LayoutTable
+from kerfpath.job.format.tables.job import PlanTable as PlanTable
 from kerfpath.job.format.tables.job import ProgramTable as ProgramTable
 from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
 from kerfpath.job.format.tables.job import tables_in as tables_in
 from kerfpath.job.format.tables.part import ContourTable as ContourTable
 from kerfpath.job.format.tables.part import MachineTable as MachineTable
-from kerfpath.job.format.tables.plan import PlanTable as PlanTable
 from kerfpath.job.format.tables.process import LONGEST_WORD as LONGEST_WORD
 from kerfpath.job.format.tables.process import ChartFile as ChartFile
 from kerfpath.job.format.tables.process import CostTable as CostTable

@@ -11,20 +11,23 @@ from kerfpath.arrays import Array
 from kerfpath.cell import MESHES
 from kerfpath.dynamics import Load
 from kerfpath.errors import InputError
-from kerfpath.job.format.tables.table import Table, given, require_distinct, require_one
-from kerfpath.job.format.values import (
+from kerfpath.job.format.tables.table import (
     Head,
     NotNegative,
     Number,
     Positive,
+    Table,
     Text,
     Three,
     existing,
     fault,
     fault_in_words,
+    given,
     heads,
     key,
     pose,
+    require_distinct,
+    require_one,
 )
 
 # -----------------------------------------------------------------------------

@@ -1,9 +1,10 @@
-"""The job file: the other tables, [comfort] to [sequence], and the rules between tables."""
+"""The job file: the other tables, [plan] to [sequence], and the rules between tables."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -19,33 +20,47 @@ from pydantic import (
     model_validator,
 )
 
+from kerfpath.arrays import short_repr
+from kerfpath.auditor import Check, Rounding, checks
+from kerfpath.cell import Cell
+from kerfpath.certificate import Certify
 from kerfpath.comfort import Band, Comfort, Reversals
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables.cell import CellTable, ToolTable
 from kerfpath.job.format.tables.part import (
     ContourTable,
     PartTable,
 )
-from kerfpath.job.format.tables.plan import PlanTable
 from kerfpath.job.format.tables.process import CostTable, ProcessTable, checked_pairs
 from kerfpath.job.format.tables.robot import RobotTable
-from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
-from kerfpath.job.format.tolerances import Tolerances
-from kerfpath.job.format.values import (
+from kerfpath.job.format.tables.table import (
     Identifier,
     Joints,
     NotNegative,
     Number,
     Positive,
+    Table,
     Text,
     fault,
     fault_in_words,
+    fields_of,
     folder_of,
+    given,
     key,
     nearest,
+    require_distinct,
 )
 from kerfpath.names import LONGEST_NAME
-from kerfpath.options import EXACT_OR_BETTER
+from kerfpath.options import (
+    CLEARANCE,
+    EXACT_OR_BETTER,
+    PENALTIES,
+    REVERSALS,
+    OptionConflict,
+    PlanOptions,
+)
+from kerfpath.plans import Plan
 from kerfpath.post import (
     PARTNERS,
     Await,
@@ -58,7 +73,141 @@ from kerfpath.post import (
     pierce_stages,
     power_curve,
 )
-from kerfpath.robots import postures_named
+from kerfpath.robots import Robot, postures_named
+from kerfpath.setting import documented, keys, setting, settings
+from kerfpath.tilt import Tilt
+
+# -----------------------------------------------------------------------------
+# The [plan] table: the search, the objective and the limits, as PlanOptions declares them.
+
+
+class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions))):  # type: ignore[misc]  # made
+    """[plan]: the search, the objective and the limits of every plan."""
+
+    path_tolerance_mm: Annotated[
+        Positive | None,
+        key("a number above 0, the largest distance of the tool from the path, in mm", "0.2"),
+    ] = None
+
+    @model_validator(mode="after")
+    def _details_go_with_what_they_are_of(self) -> PlanTable:
+        if self.tilt_deg is None and (more := self._given(Tilt)):
+            raise fault(f"tilt_deg with {more[0]}", "none", "add tilt_deg", (more[0],))
+        if not self.certify and (more := self._given(Certify)):
+            expected, got = f"no {more[0]} with certify = false", _toml(getattr(self, more[0]))
+            raise fault(expected, got, "remove one", (more[0],))
+        return self
+
+    def _given(self, kind: type) -> list[str]:
+        """Return the keys of an option's details that the job gives."""
+        given = [name for name in keys(kind) if name in self.model_fields_set]
+        return [name for name in given if getattr(self, name) is not False]
+
+    @property
+    def executed_tolerance(self) -> float | None:
+        """Largest distance of the executed tip from the path, m; None if it is only reported."""
+        return None if self.path_tolerance_mm is None else self.path_tolerance_mm / 1000
+
+    def resolve(self, robot: Robot, **others: Any) -> PlanOptions:
+        """Return the plan options of the table, and `others` of other tables, in SI.
+
+        Raises
+        ------
+        OptionConflict
+            Two options conflict.
+        """
+        values = self.si(PlanOptions) | {"interpolation": "linear"} | others
+        if self.posture is not None:
+            values["postures"] = postures_named(self.posture, robot.kinematics)
+        if self.rotation_deg is not None:
+            values["rotation"] = np.where(robot.endless, values["rotation"], np.inf)
+        if self.refine is None:
+            values["refine"] = self.method in EXACT_OR_BETTER
+        values["tilt"] = None if self.tilt_deg is None else Tilt(**self.si(Tilt))
+        values["certify"] = Certify(**self.si(Certify)) if self.certify else None
+        return PlanOptions(**values)
+
+
+# -----------------------------------------------------------------------------
+# Options that do not go together, in the words of a job.
+
+
+def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str, str], str]:
+    """Return the key of two options in conflict, and the message in the words of a job."""
+    names = {CLEARANCE: "clearance_band_mm", PENALTIES: "costs in [comfort]"}
+    names[REVERSALS] = "reversals_cost"
+    for name, each in settings(PlanOptions).items():
+        names[name] = next(iter(each.keys), name)
+    key = names[conflict.option]
+    expected = f"no {key}" if conflict.expected is None else f"{key} = {_toml(conflict.expected)}"
+    beside = " and ".join(
+        f"{names[name]} = {_toml(value)}" if isinstance(value, str) else names[name]
+        for name, value in conflict.beside.items()
+    )
+    said = f"expected {expected} with {beside}, got {_toml(getattr(table, key))}; change one"
+    for name in (CLEARANCE, REVERSALS):
+        if name in conflict.beside:
+            return ("comfort", names[name]), said
+    of_both = (key, *(names[name] for name in conflict.beside))
+    return ("plan", next((each for each in of_both if each in table.model_fields_set), key)), said
+
+
+def _toml(value: object) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return " or ".join(map(_toml, value))
+    return f'"{value}"' if isinstance(value, str) else f"{value}"
+
+
+# -----------------------------------------------------------------------------
+# The tolerances of the audit between the nodes, which [audit] sets.
+
+
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """Tolerances of the audit between the nodes."""
+
+    path: float = setting(
+        0.1,
+        "largest distance of the tool tip from the path",
+        unit="mm",
+        above=0,
+        example="0.1",
+        key="path_tolerance_mm",
+    )
+    axis: float = setting(
+        1.0,
+        "largest angle between the tool axis and the requested one",
+        unit="deg",
+        above=0,
+        example="1",
+        key="axis_tolerance_deg",
+    )
+
+    __repr__ = short_repr
+
+    def checks(
+        self,
+        plan: Plan,
+        *,
+        reference: Contour | None = None,
+        cell: Cell | None = None,
+        rounding: Rounding | None = None,
+    ) -> list[Check]:
+        """Return the audit's table of a plan within these tolerances, see `auditor.checks`."""
+        return checks(
+            plan,
+            reference=reference,
+            path_tolerance=self.path,
+            axis_tolerance=self.axis,
+            cell=cell,
+            rounding=rounding,
+        )
+
 
 # -----------------------------------------------------------------------------
 # The [comfort] table: margins to singularities, limits and bodies, and penalties beyond them.

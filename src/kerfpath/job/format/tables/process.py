@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from kerfpath.errors import InputError
-from kerfpath.job.format.tables.table import Table
-from kerfpath.job.format.values import (
+from kerfpath.job.format.tables.table import (
     NotNegative,
     Number,
     Positive,
+    Table,
     Text,
     fault,
     fault_in_words,

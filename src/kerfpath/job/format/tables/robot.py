@@ -16,8 +16,7 @@ from kerfpath.acceleration_table import AccelerationTable
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.execution import Response, read_response, response, response_from
-from kerfpath.job.format.tables.table import Table, given, require_distinct
-from kerfpath.job.format.values import (
+from kerfpath.job.format.tables.table import (
     FAULT,
     Axis,
     Joints,
@@ -28,15 +27,18 @@ from kerfpath.job.format.values import (
     Positive,
     Ratio,
     Signs,
+    Table,
     Text,
     Three,
     existing,
     fault,
     fault_in_words,
     folder_of,
+    given,
     key,
     one_of,
     pose,
+    require_distinct,
 )
 from kerfpath.robots import (
     FAMILIES,

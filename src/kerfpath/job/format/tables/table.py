@@ -1,20 +1,172 @@
-"""The base class of all tables of a job file, and the rules that they share."""
+"""What all tables of a job file share: values and their types, messages, base class and rules."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+import tomllib
+from collections.abc import Callable, Collection, Sequence
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+from pydantic_core import PydanticCustomError
+from scipy.spatial.transform import Rotation
 
-from kerfpath.job.format.values import (
-    JointsNotNegative,
-    NotNegative,
-    Positive,
-    fault,
-    key,
-)
+from kerfpath.arrays import Array, freeze
+from kerfpath.robots import acceleration_ratios
 from kerfpath.setting import Setting, keys, settings
+
+# -----------------------------------------------------------------------------
+# x
+
+
+class HeadPose(NamedTuple):
+    """Pose of the tip of a cutting head in the flange.
+
+    Parameters
+    ----------
+    xyz_mm : (3,) mm
+        Position of the tip.
+    rpy_deg : (3,) deg
+        Its orientation as in `pose`; z points along the beam, out of the nozzle into the part.
+    """
+
+    xyz_mm: tuple[float, ...]
+    rpy_deg: tuple[float, ...]
+
+
+@cache
+def heads() -> dict[str, HeadPose]:
+    """Return the shipped cutting heads by name; their dimensions are generic."""
+    text = (files("kerfpath.job") / "heads.toml").read_text(encoding="utf-8")
+    return {
+        name: HeadPose(tuple(values["xyz_mm"]), tuple(values["rpy_deg"]))
+        for name, values in tomllib.loads(text).items()
+    }
+
+
+def pose(xyz_mm: Sequence[float], rpy_deg: Sequence[float]) -> Array:
+    """Return the pose (4, 4), in m, of a position and three angles, as in a URDF origin.
+
+    Parameters
+    ----------
+    xyz_mm : (3,) mm
+        Position.
+    rpy_deg : (3,) deg
+        Roll, pitch and yaw about the fixed axes x, y and z, applied in this order:
+        R = Rz(yaw) Ry(pitch) Rx(roll).
+    """
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
+    T[:3, 3] = np.multiply(xyz_mm, 1e-3)
+    return freeze(T)
+
+
+# -----------------------------------------------------------------------------
+# Types of the values in a job file, and the messages about wrong values.
+
+LARGEST = 1e6
+"""Largest number in a job, in the unit of its key; a kilometre in mm is a typing error."""
+SMALLEST = 1e-9
+"""Least positive number in a job: smaller numbers vanish when units are converted."""
+MOST_NODES = 1_000_000
+"""Most nodes of a contour: more than any contour needs, few enough to fit into memory."""
+FAULT = "kerfpath"
+"""Error type of the rules below that pydantic cannot state itself."""
+_LISTED = 12
+"""Most known names that a message lists."""
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """Return words with the `known` names that are most similar to `name`, or with all of them."""
+    within = [k for k in known if name and name.lower() in k.lower()]
+    if near := within[:3] or get_close_matches(name, known, n=3, cutoff=0.5):
+        return f"nearest: {', '.join(near)}"
+    return f"known: {', '.join(known)}" if len(known) <= _LISTED else "no known name is similar"
+
+
+def key(expected: str, example: str, **bounds: Any) -> Any:
+    """Return a field with its bounds, and with the expected value and an example for messages."""
+    return Field(description=expected, examples=[example], **bounds)
+
+
+def fault(
+    expected: str, got: str | None, remedy: str, where: tuple[str | int, ...] = ()
+) -> PydanticCustomError:
+    """Return an error at the key `where`, relative to here; `got` None shows the value itself."""
+    said = {"expected": expected, "got": got, "remedy": remedy, "where": where}
+    return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
+
+
+def fault_in_words(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """Return an error with the complete message `said` at the key `where`, relative to here."""
+    return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
+
+
+def folder_of(info: ValidationInfo) -> Path:
+    """Return the folder of the job file."""
+    return info.context["folder"] if info.context else Path()
+
+
+def existing(what: str) -> Callable[[str, ValidationInfo], str]:
+    """Return a validator that requires a file, its path relative to the job's folder."""
+
+    def check(value: str, info: ValidationInfo) -> str:
+        folder = folder_of(info)
+        try:
+            is_file, is_there = (folder / value).is_file(), (folder / value).exists()
+        except (OSError, ValueError):  # a name that the file system cannot hold
+            is_file = is_there = False
+        if not is_file:
+            why = "it is not a file" if is_there else f"it is not in {folder}"
+            raise fault(what, None, f"{why}; give its path relative to the job file")
+        return value
+
+    return check
+
+
+def one_of(what: str, names: Callable[[], Collection[str]], hint: str = "") -> AfterValidator:
+    """Return a validator that admits only one of `names`."""
+
+    def check(value: str) -> str:
+        if value not in names():
+            raise fault(what, None, f"{nearest(value, names())}{hint}")
+        return value
+
+    return AfterValidator(check)
+
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
+NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
+Axis = Annotated[int, Field(ge=1, le=7)]
+# TOML arrays arrive as lists, so these tuples are not strict; their elements are.
+Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
+# One number for every joint; the length is checked once the robot is known.
+Joints = Annotated[tuple[Number, ...], Field(strict=False, min_length=1)]
+JointsPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
+JointsNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=1)]
+Signs = Annotated[tuple[Literal[-1, 1], ...], Field(strict=False, min_length=1)]
+Lengths = dict[str, Number]
+# One printable line that is not blank.
+Text = Annotated[str, Field(pattern=r"^[^\p{C}\p{Zl}\p{Zp}]*\S[^\p{C}\p{Zl}\p{Zp}]*$")]
+Identifier = Annotated[
+    str | None,
+    key(
+        "a name of letters, digits and _, a letter first, at most 32 characters",
+        '"trim_1"',
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+    ),
+]
+Head = Annotated[str, one_of("a cutting head", heads)]
+Ratio = Annotated[str, one_of("a known ratio", acceleration_ratios)]
+
+
+# -----------------------------------------------------------------------------
+# The base class of all tables, and the rules that they share.
 
 
 class Table(BaseModel):
