@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from kerfpath import __version__
+from kerfpath.cli.reading import ReadingOptions, reads_drawing
 from kerfpath.cli.show import (
     busy,
     compile_kernels,
@@ -53,63 +54,6 @@ Json = Annotated[
 """Silences `out`; `print_json` prints then."""
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; the command makes it if needed.")
-]
-Unit = Annotated[
-    str | None,
-    typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
-]
-Gap = Annotated[
-    float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
-]
-EdgeTurn = Annotated[
-    float,
-    typer.Option(help="Distance before and behind a sharp edge within which the beam turns, mm."),
-]
-OuterTowards = Annotated[
-    tuple[float, float, float] | None,
-    typer.Option(
-        help="Direction that the outer sides of sheets face, in the part. Default: the side "
-        "that less of the part hides; for a flat sheet, the side that faces up."
-    ),
-]
-Axis = Annotated[
-    tuple[float, float, float] | None,
-    typer.Option(help="Tool axis for lines in space, and for points without one."),
-]
-Columns = Annotated[
-    str | None,
-    typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
-]
-Sort = Annotated[
-    Literal["open", "closed"] | None,
-    typer.Option(help="Sort the points of a table, which are in no order, along a curve."),
-]
-Beam = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Output of a robot program that is on while it cuts, as $OUT[5]; twice: the "
-        "statements that switch on and off; or the speed of its cuts, as '120 mm/s'."
-    ),
-]
-Section = Annotated[
-    tuple[float, float, float] | None,
-    typer.Option(help="Normal of planes that cut a mesh: their loops are the contours."),
-]
-SectionMm = Annotated[
-    list[float] | None,
-    typer.Option(help="Distance of such a plane along its normal, mm; once for each."),
-]
-Machine = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TABLE",
-        help="Rotary axes of the machine whose program it is, as machine of [part] in a job: "
-        "'{ head = \"CB\", tcp = true }'.",
-    ),
-]
-DrawingFrame = Annotated[
-    Literal["leave_out", "cut"] | None,
-    typer.Option(help="What to do with a rectangle around all else in a DXF."),
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
@@ -187,7 +131,9 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 
 
 @app.command()
+@reads_drawing
 def new(
+    *,
     drawing: Annotated[
         Path,
         typer.Argument(metavar="PART", help="STEP, IGES, DXF, a mesh, points (CSV), or a path."),
@@ -196,18 +142,7 @@ def new(
         str | None,
         typer.Option(metavar="ID", help="Robot of the library; default: a placeholder to change."),
     ] = None,
-    unit: Unit = None,
-    gap_mm: Gap = 0.05,
-    edge_turn_mm: EdgeTurn = 1.0,
-    outer_towards: OuterTowards = None,
-    axis: Axis = None,
-    columns: Columns = None,
-    sort: Sort = None,
-    beam: Beam = None,
-    section: Section = None,
-    section_mm: SectionMm = None,
-    machine: Machine = None,
-    drawing_frame: DrawingFrame = None,
+    how: ReadingOptions,
     to: Annotated[
         Path | None,
         typer.Option("--out", metavar="JOB.toml", help="Job to write; default: PART.toml."),
@@ -224,22 +159,7 @@ def new(
     """
     from kerfpath.cli.drawing_output import drawing_by, write_new
 
-    how = drawing_by(
-        drawing,
-        unit=unit,
-        gap=gap_mm / 1000,
-        edge_turn=edge_turn_mm / 1000,
-        outer_towards=outer_towards,
-        axis=axis,
-        columns=columns,
-        sort=sort,
-        beam=beam,
-        section=section,
-        section_at=[height / 1000 for height in section_mm or ()],
-        machine=machine,
-        drawing_frame=drawing_frame,
-    )
-    write_new(how, to, robot=robot)
+    write_new(drawing_by(drawing, how), to, robot=robot)
 
 
 @app.command()
@@ -325,23 +245,14 @@ def speed(
 
 
 @app.command()
+@reads_drawing
 def contours(
+    *,
     file: Annotated[
         Path,
         typer.Argument(metavar="FILE", help="STEP, IGES, DXF, a mesh, points (CSV), or a path."),
     ],
-    unit: Unit = None,
-    gap_mm: Gap = 0.05,
-    edge_turn_mm: EdgeTurn = 1.0,
-    outer_towards: OuterTowards = None,
-    axis: Axis = None,
-    columns: Columns = None,
-    sort: Sort = None,
-    beam: Beam = None,
-    section: Section = None,
-    section_mm: SectionMm = None,
-    machine: Machine = None,
-    drawing_frame: DrawingFrame = None,
+    how: ReadingOptions,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -363,22 +274,7 @@ def contours(
 
     if html is not None:
         require_output(html, "--html")
-    drawing = drawing_by(
-        file,
-        unit=unit,
-        gap=gap_mm / 1000,
-        edge_turn=edge_turn_mm / 1000,
-        outer_towards=outer_towards,
-        axis=axis,
-        columns=columns,
-        sort=sort,
-        beam=beam,
-        section=section,
-        section_at=[height / 1000 for height in section_mm or ()],
-        machine=machine,
-        drawing_frame=drawing_frame,
-    )
-    list_contours(drawn(drawing), html, everything=everything)
+    list_contours(drawn(drawing_by(file, how)), html, everything=everything)
 
 
 @app.command()

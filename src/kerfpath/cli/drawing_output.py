@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from rich.markup import escape
 
 from kerfpath.arrays import counted
 from kerfpath.cad import Loop, Part, read
+from kerfpath.cli.reading import ReadingOptions
 from kerfpath.cli.show import busy, out, print_json, progress_bars, show_files, table
 from kerfpath.errors import InputError
 from kerfpath.files import write_whole
@@ -24,40 +23,26 @@ from kerfpath.report import DrawnLoop, render_drawing
 # The one-line summary of a drawing, which every command that reads a drawing prints.
 
 
-def drawing_by(
-    file: Path,
-    *,
-    unit: str | None,
-    gap: float,
-    edge_turn: float,
-    outer_towards: tuple[float, float, float] | None,
-    axis: tuple[float, float, float] | None,
-    columns: str | None,
-    sort: Literal["open", "closed"] | None = None,
-    beam: list[str] | None = None,
-    section: tuple[float, float, float] | None = None,
-    section_at: Sequence[float] = (),
-    machine: str | None = None,
-    drawing_frame: Literal["leave_out", "cut"] | None = None,
-) -> Drawing:
+def drawing_by(file: Path, how: ReadingOptions) -> Drawing:
     """Return a drawing by the options of a command.
 
-    `columns` is x,y,z,... or x=NAME,y=NAME,...; `machine` is as in a job.
+    Columns are x,y,z,... or x=NAME,y=NAME,...; the machine is as in a job.
     """
+    beam = how.beam
     return Drawing(
         file=file,
-        unit=unit,
-        gap=gap,
-        edge_turn=edge_turn,
-        outer_towards=None if outer_towards is None else np.array(outer_towards),
-        axis=None if axis is None else np.array(axis),
-        columns=None if columns is None else _columns(columns),
-        sort=sort,
+        unit=how.unit,
+        gap=how.gap_mm / 1000,
+        edge_turn=how.edge_turn_mm / 1000,
+        outer_towards=None if how.outer_towards is None else np.array(how.outer_towards),
+        axis=None if how.axis is None else np.array(how.axis),
+        columns=None if how.columns is None else _columns(how.columns),
+        sort=how.sort,
         beam=beam[0] if beam and len(beam) == 1 else beam or None,
-        section=None if section is None else np.array(section),
-        section_at=tuple(section_at),
-        machine=None if machine is None else machine_of(machine, "--machine"),
-        drawing_frame=drawing_frame,
+        section=None if how.section is None else np.array(how.section),
+        section_at=tuple(height / 1000 for height in how.section_mm or ()),
+        machine=None if how.machine is None else machine_of(how.machine, "--machine"),
+        drawing_frame=how.drawing_frame,
     )
 
 
