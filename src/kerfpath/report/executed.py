@@ -61,11 +61,7 @@ class ExecutedPath:
 
 def error_along(path: ExecutedPath) -> go.Figure:
     """Return the distance from the path along it, mm, with and without the lag of the joints."""
-    figure = go.Figure(layout=base_layout(HEIGHT, hovermode="x unified"))
-    figure.update_layout(
-        margin={"l": 62, "r": 44, "t": 40, "b": 48},
-        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
-    )
+    figure = _along(HEIGHT)
     order = np.argsort(path.s, kind="stable")
     some = order[spread(len(order), MOST_POINTS)]
     for name, values, colour in (
@@ -82,9 +78,17 @@ def error_along(path: ExecutedPath) -> go.Figure:
         )
     figure.add_hline(y=path.allowed * 1e3, line={"color": INK, "width": 1, "dash": "dash"})
     top = 1.15e3 * max(float(path.off.max()), path.allowed)
+    figure.update_layout(yaxis=axis(title=axis_title("distance, mm"), range=[0, top]))
+    return figure
+
+
+def _along(height: int) -> go.Figure:
+    """Return an empty figure of what changes along a contour."""
+    figure = go.Figure(layout=base_layout(height, hovermode="x unified"))
     figure.update_layout(
+        margin={"l": 62, "r": 44, "t": 40, "b": 48},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
         xaxis=axis(title=axis_title("length, mm"), unifiedhovertitle={"text": "%{x:.1f} mm"}),
-        yaxis=axis(title=axis_title("distance, mm"), range=[0, top]),
     )
     return figure
 
@@ -170,11 +174,7 @@ class PowerPath:
 
 def power_along(path: PowerPath) -> go.Figure:
     """Return the power and the speed along the way, per cent; the power is set at targets."""
-    figure = go.Figure(layout=base_layout(POWER_HEIGHT, hovermode="x unified"))
-    figure.update_layout(
-        margin={"l": 62, "r": 44, "t": 40, "b": 48},
-        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
-    )
+    figure = _along(POWER_HEIGHT)
     some = spread(len(path.fine_s), MOST_POINTS)
     steps = np.append(path.set, path.set[-1:])
     for name, s, values, colour, shape in (
@@ -190,8 +190,5 @@ def power_along(path: PowerPath) -> go.Figure:
             line={"color": colour, "width": 1.8, "shape": shape},
             hovertemplate="%{y:.1f} %",
         )
-    figure.update_layout(
-        xaxis=axis(title=axis_title("length, mm"), unifiedhovertitle={"text": "%{x:.1f} mm"}),
-        yaxis=axis(title=axis_title("share, %"), range=[0, 105]),
-    )
+    figure.update_layout(yaxis=axis(title=axis_title("share, %"), range=[0, 105]))
     return figure

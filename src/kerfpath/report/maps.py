@@ -13,7 +13,17 @@ from kerfpath.arrays import Array
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss
 from kerfpath.plans import Plan
-from kerfpath.report.style import ALERT, INK, QUIET, axis, axis_title, base_layout, reason_colours
+from kerfpath.report.style import (
+    ALERT,
+    INK,
+    QUIET,
+    axis,
+    axis_id,
+    axis_title,
+    base_layout,
+    label,
+    reason_colours,
+)
 from kerfpath.robots import posture_name
 
 ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
@@ -67,17 +77,13 @@ def feasibility_map(
     for row, mu in enumerate(postures):
         axes |= _axes(row, len(postures), height, nodes)
         annotations.append(
-            {
-                "text": posture_name(mu) + (" (in use)" if mu in used else ""),
-                "font": {"size": 12, "color": INK if mu in used or plan is None else QUIET},
-                "x": 0,
-                "xref": "paper",
-                "xanchor": "left",
-                "y": 1,
-                "yref": f"{_axis('y', row)} domain",
-                "yanchor": "bottom",
-                "showarrow": False,
-            }
+            label(
+                posture_name(mu) + (" (in use)" if mu in used else ""),
+                ((0, "paper"), (1, f"{axis_id('y', row)} domain")),
+                colour=INK if mu in used or plan is None else QUIET,
+                xanchor="left",
+                yanchor="bottom",
+            )
         )
     meta = {
         "reasons": list(graph.reasons),
@@ -103,8 +109,8 @@ def feasibility_map(
             dx=1,
             y0=float(gamma[0]),
             dy=step,
-            xaxis=_axis("x", row),
-            yaxis=_axis("y", row),
+            xaxis=axis_id("x", row),
+            yaxis=axis_id("y", row),
             zmin=-0.5,
             zmax=len(graph.reasons) - 0.5,
             colorscale=_steps(reason_colours(graph.reasons)),
@@ -174,16 +180,16 @@ def _axes(row: int, rows: int, height: int, nodes: int) -> dict[str, object]:
     top = 1 - row * (ROW + GAP) / inner
     last = row == rows - 1
     return {
-        _axis("xaxis", row): axis(
-            anchor=_axis("y", row),
+        axis_id("xaxis", row): axis(
+            anchor=axis_id("y", row),
             matches=None if row == 0 else "x",
             range=[-0.5, nodes - 0.5],
             showticklabels=last,
             showgrid=False,
             title=axis_title("node along the contour") if last else None,
         ),
-        _axis("yaxis", row): axis(
-            anchor=_axis("x", row),
+        axis_id("yaxis", row): axis(
+            anchor=axis_id("x", row),
             matches=None if row == 0 else "y",
             domain=[max(0.0, top - ROW / inner), min(1.0, top)],
             range=[-180, 180],
@@ -201,7 +207,7 @@ def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: in
     # plotly breaks a line at NaN.
     x = np.concatenate([part for piece in pieces for part in (piece[0], gap)])[:-1]
     y = np.concatenate([part for piece in pieces for part in (piece[1], gap)])[:-1]
-    where = {"xaxis": _axis("x", row), "yaxis": _axis("y", row), "showlegend": False}
+    where = {"xaxis": axis_id("x", row), "yaxis": axis_id("y", row), "showlegend": False}
     template = "node %{x}<br>gamma %{y:.1f}°<extra>chosen</extra>"
     for colour, width in (("white", 4.5), (INK, 2)):
         figure.add_scatter(
@@ -236,10 +242,10 @@ def _lines_of(marks: Sequence[tuple[float, str]], rows: int) -> list[dict[str, o
             "type": "line",
             "x0": node,
             "x1": node,
-            "xref": _axis("x", row),
+            "xref": axis_id("x", row),
             "y0": 0,
             "y1": 1,
-            "yref": f"{_axis('y', row)} domain",
+            "yref": f"{axis_id('y', row)} domain",
             "line": line,
         }
         for (node, _), row, line in product(marks, range(rows), (halo, dots))
@@ -248,18 +254,9 @@ def _lines_of(marks: Sequence[tuple[float, str]], rows: int) -> list[dict[str, o
 
 def _words_of(marks: Sequence[tuple[float, str]]) -> list[dict[str, object]]:
     """Return the texts of marks, above the first panel."""
+    at = ((1, "paper"), (1, "y domain"))
     return [
-        {
-            "text": f"┊ {escape(words)}",
-            "font": {"size": 12, "color": ALERT},
-            "x": 1,
-            "xref": "paper",
-            "xanchor": "right",
-            "y": 1,
-            "yref": "y domain",
-            "yanchor": "bottom",
-            "showarrow": False,
-        }
+        label(f"┊ {escape(words)}", at, colour=ALERT, xanchor="right", yanchor="bottom")
         for _, words in marks
     ]
 
@@ -297,10 +294,6 @@ def _steps(colours: tuple[str, ...]) -> list[tuple[float, str]]:
     """Return a colour scale of equal steps, one per reason code."""
     n = len(colours)
     return [(edge, c) for i, c in enumerate(colours) for edge in (i / n, (i + 1) / n)]
-
-
-def _axis(kind: str, row: int) -> str:
-    return kind if row == 0 else f"{kind}{row + 1}"
 
 
 def _share(part: float) -> str:

@@ -18,10 +18,12 @@ from kerfpath.report.style import (
     INK,
     QUIET,
     axis,
+    axis_id,
     axis_title,
     band,
     base_layout,
     joint_colours,
+    label,
     short,
 )
 from kerfpath.robots import posture_name
@@ -60,13 +62,13 @@ def joint_positions(plan: Plan) -> go.Figure:
     for joint, (name, unit) in enumerate(zip(robot.joint_names, robot.units, strict=True)):
         scale, suffix = SHOWN[unit]
         row, column = divmod(joint, 2)
-        x, y = _axis("x", joint), _axis("y", joint)
+        x, y = axis_id("x", joint), axis_id("y", joint)
         top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
         low, high = scale * limits.lower[joint], scale * limits.upper[joint]
         q, endless = scale * plan.unwrapped[:, joint], bool(limits.endless[joint])
         middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN[unit])
         axes |= {
-            _axis("xaxis", joint): axis(
+            axis_id("xaxis", joint): axis(
                 anchor=y,
                 domain=[0, 0.46] if column == 0 else [0.54, 1],
                 matches=None if joint == 0 else "x",
@@ -74,7 +76,7 @@ def joint_positions(plan: Plan) -> go.Figure:
                 title=axis_title("time, s") if row == rows - 1 else None,
                 unifiedhovertitle={"text": "%{x:.3f} s"},
             ),
-            _axis("yaxis", joint): axis(
+            axis_id("yaxis", joint): axis(
                 anchor=x,
                 domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
                 ticksuffix=suffix,
@@ -97,19 +99,9 @@ def joint_positions(plan: Plan) -> go.Figure:
             spare = min(float(q.min()) - low, high - float(q.max()))
             ends, room = [_rounded(value, suffix) for value in (low, high)], _rounded(spare, suffix)
             span = f"limits {ends[0]} to {ends[1]}, {room} to spare"
-        annotations.append(
-            {
-                "text": f"{name} <span style='color:{QUIET}'>· {span}</span>",
-                "font": {"size": 12, "color": INK},
-                "x": 0,
-                "xref": f"{x} domain",
-                "xanchor": "left",
-                "y": 1,
-                "yref": f"{y} domain",
-                "yanchor": "bottom",
-                "showarrow": False,
-            }
-        )
+        said = f"{name} <span style='color:{QUIET}'>· {span}</span>"
+        at = ((0, f"{x} domain"), (1, f"{y} domain"))
+        annotations.append(label(said, at, colour=INK, xanchor="left", yanchor="bottom"))
         if not endless:
             shapes += [_level(float(bound), x, y, QUIET, "solid") for bound in (low, high)]
     _lay_out(figure, plan.time, axes, shapes, annotations)
@@ -155,17 +147,17 @@ def limit_shares(plan: Plan) -> go.Figure:
         ("acceleration", plan.time[1:-1], plan.acceleration_share, plan.settings.eta_a),
     )
     for row, (what, time, share, eta) in enumerate(panels):
-        x, y = _axis("x", row), _axis("y", row)
+        x, y = axis_id("x", row), axis_id("y", row)
         bottom = 0.0 if row else (SHARE_ROW + GAP) / (2 * SHARE_ROW + GAP)
         axes |= {
-            _axis("xaxis", row): axis(
+            axis_id("xaxis", row): axis(
                 anchor=y,
                 matches=None if row == 0 else "x",
                 showticklabels=row == 1,
                 title=axis_title("time, s") if row else None,
                 unifiedhovertitle={"text": "%{x:.3f} s"},
             ),
-            _axis("yaxis", row): axis(
+            axis_id("yaxis", row): axis(
                 anchor=x,
                 domain=[bottom, bottom + SHARE_ROW / (2 * SHARE_ROW + GAP)],
                 ticksuffix=" %",
@@ -174,17 +166,8 @@ def limit_shares(plan: Plan) -> go.Figure:
             ),
         }
         if not len(share):
-            annotations.append(
-                {
-                    "text": f"No {what} to draw: it takes 3 nodes, and the plan has {len(plan.q)}",
-                    "font": {"size": 14, "color": QUIET},
-                    "x": 0.5,
-                    "xref": f"{x} domain",
-                    "y": 0.5,
-                    "yref": f"{y} domain",
-                    "showarrow": False,
-                }
-            )
+            said = f"No {what} to draw: it takes 3 nodes, and the plan has {len(plan.q)}"
+            annotations.append(label(said, ((0.5, f"{x} domain"), (0.5, f"{y} domain")), size=14))
         for joint, name in enumerate(plan.robot.joint_names):
             figure.add_scatter(
                 x=short(time),
@@ -203,18 +186,8 @@ def limit_shares(plan: Plan) -> go.Figure:
             if eta != 1:
                 shapes.append(_level(100.0 * eta * sign, x, y, QUIET, "dash"))
         if eta != 1:
-            annotations.append(
-                {
-                    "text": f"η {eta * 100:g} %",
-                    "font": {"size": 11, "color": QUIET},
-                    "x": 1,
-                    "xref": f"{x} domain",
-                    "xanchor": "left",
-                    "y": 100 * eta,
-                    "yref": y,
-                    "showarrow": False,
-                }
-            )
+            at = ((1, f"{x} domain"), (100 * eta, y))
+            annotations.append(label(f"η {eta * 100:g} %", at, size=11, xanchor="left"))
     _lay_out(figure, plan.time, axes, shapes, annotations)
     return figure
 
@@ -248,22 +221,12 @@ def _posture_bands(
         t0 = (plan.time[max(first - 1, 0)] + plan.time[first]) / 2
         t1 = (plan.time[last] + plan.time[min(last + 1, len(plan.time) - 1)]) / 2
         for panel in range(panels):
-            x, y = _axis("x", panel), _axis("y", panel)
+            x, y = axis_id("x", panel), axis_id("y", panel)
             if number % 2:
                 shapes.append(band(t0, t1, xref=x, yref=f"{y} domain"))
             if panel in labelled and t1 - t0 > 0.18 * whole:
-                annotations.append(
-                    {
-                        "text": posture_name(mu),
-                        "font": {"size": 10, "color": QUIET},
-                        "x": (t0 + t1) / 2,
-                        "xref": x,
-                        "y": 0.1,
-                        "yref": f"{y} domain",
-                        "yanchor": "bottom",
-                        "showarrow": False,
-                    }
-                )
+                at = (((t0 + t1) / 2, x), (0.1, f"{y} domain"))
+                annotations.append(label(posture_name(mu), at, size=10, yanchor="bottom"))
     return shapes, annotations
 
 
@@ -285,10 +248,6 @@ def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, ob
         "line": {"color": colour if dash == "solid" else FAINT, "width": 1, "dash": dash},
         "layer": "below",
     }
-
-
-def _axis(kind: str, panel: int) -> str:
-    return kind if panel == 0 else f"{kind}{panel + 1}"
 
 
 def _rounded(value: float, unit: str) -> str:

@@ -108,6 +108,28 @@ def axis_title(text: str) -> dict[str, object]:
     return {"text": text, "font": {"size": 12, "color": QUIET}, "standoff": 8}
 
 
+def axis_id(kind: str, panel: int) -> str:
+    """Return the name of an axis ("x", "yaxis") of a panel, counted from 0, as plotly counts it."""
+    return kind if panel == 0 else f"{kind}{panel + 1}"
+
+
+def label(
+    text: str, at: tuple[tuple[float, str], tuple[float, str]], *, size: int = 12,
+    colour: str = QUIET, **anchor: Any,
+) -> dict[str, object]:  # fmt: skip
+    """Return a text without an arrow; `at` has its x and y, each with what they refer to."""
+    (x, xref), (y, yref) = at
+    return {
+        "text": text,
+        "font": {"size": size, "color": colour},
+        "x": x,
+        "xref": xref,
+        "y": y,
+        "yref": yref,
+        "showarrow": False,
+    } | anchor
+
+
 def say_why_empty(figure: go.Figure, why: str) -> None:
     """Say in the middle of a figure why nothing is drawn in it."""
     figure.add_annotation(
