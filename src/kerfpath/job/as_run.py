@@ -31,7 +31,7 @@ from kerfpath.execution import (
     speed_of,
     timing_of,
 )
-from kerfpath.job.audit_report import check
+from kerfpath.job.audit_report import check, count
 from kerfpath.job.format import Job
 from kerfpath.planner import at_most
 from kerfpath.plans import Plan
@@ -112,17 +112,8 @@ def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
     """Return a failed check if the job asks for a guarantee between the nodes, else none."""
     if job.options.between_nodes != "guaranteed":
         return ()
-    return (
-        Check(
-            code="between-nodes",
-            title="joint limits between the nodes that are not checked",
-            value=1.0,
-            limit=0.0,
-            unit="count",
-            node=0,
-            advice=f"they cannot be guaranteed: {why}",
-        ),
-    )
+    title = "joint limits between the nodes that are not checked"
+    return (count("between-nodes", title, 1, advice=f"they cannot be guaranteed: {why}"),)
 
 
 def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = "") -> AsRun:
@@ -153,16 +144,12 @@ def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
     """Yield the check of the largest share of a torque limit, if the load is known."""
     peak = run.peak_torque
     if peak is not None:
-        yield Check(
-            code="torque-as-run",
-            title=f"joint torque share as run, sampled, without friction and rotors (highest: "
-            f"joint {peak.joint + 1})",
-            value=peak.share,
-            limit=1.0 + ZONE_SLACK,
-            unit="share",
-            node=_node(run, plan, peak.time),
-            advice=f"joint {peak.joint + 1} exceeds its limit: go more slowly, or carry less",
-        )
+        joint, node = f"joint {peak.joint + 1}", _node(run, plan, peak.time)
+        how = f"sampled, without friction and rotors (highest: {joint})"
+        yield check(
+            "torque-as-run", f"joint torque share as run, {how}", peak.share, 1 + ZONE_SLACK,
+            "share", node, advice=f"{joint} exceeds its limit: go more slowly, or carry less",
+        )  # fmt: skip
 
 
 def _cycle(run: Executed, plan: Plan) -> Iterator[Check]:
@@ -172,33 +159,22 @@ def _cycle(run: Executed, plan: Plan) -> Iterator[Check]:
     if stretch is None or max(controller.shortest, controller.cycle) <= 0:
         return
     found = controller.short_moves(motion.duration / (1 + stretch))
-    yield Check(
-        code="cycle-as-run",
-        title="time by which the controller's cycle stretches a move",
-        value=found.share,
-        limit=STRETCHED,
-        unit="share",
-        node=_node(run, plan, float(motion.time[found.worst + 1])),
-        level=found.level,
-        advice=f"{found.words}; {REMEDY_SHORT}",
-    )
+    node = _node(run, plan, float(motion.time[found.worst + 1]))
+    yield check(
+        "cycle-as-run", "time by which the controller's cycle stretches a move", found.share,
+        STRETCHED, "share", node, level=found.level, advice=f"{found.words}; {REMEDY_SHORT}",
+    )  # fmt: skip
 
 
 def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:
     """Return the check of the speed between the ramps at both ends."""
     share, at = timing.slowest
-    time = float(np.interp(at, timing.length, timing.time))
-    return Check(
-        code="speed-as-run",
-        title="loss of programmed speed, between the ramps",
-        value=1 - share,
-        limit=1 - AT_SPEED,
-        unit="share",
-        node=_node(run, plan, time),
-        level="warning",
-        advice=f"the programmed speed is held on {timing.held:.1%} of the length, as the joints "
-        "keep their limits",
-    )
+    node = _node(run, plan, float(np.interp(at, timing.length, timing.time)))
+    said = f"the programmed speed is held on {timing.held:.1%} of the length, as the joints keep "
+    return check(
+        "speed-as-run", "loss of programmed speed, between the ramps", 1 - share, 1 - AT_SPEED,
+        "share", node, level="warning", advice=f"{said}their limits",
+    )  # fmt: skip
 
 
 def _deviations(
@@ -219,26 +195,16 @@ def _deviations(
     else:
         advice = "by the model of the response; the measured runs say what is really left"
     # Of corners alone unless the joints lag; then by a model, which no program is refused for.
-    yield Check(
-        code="tip-as-run",
-        title="distance of the tool tip from the path as run",
-        value=off.largest,
-        limit=tip,
-        unit="m",
-        node=_nearest(plan, off.T[off.worst]),
-        level="error" if strict else "warning",
-        advice=advice,
-    )
-    yield Check(
-        code="axis-as-run",
-        title="angle of the tool axis to that of the path as run",
-        value=float(off.axis[off.worst_axis]),
-        limit=allowed.axis + cone,
-        unit="rad",
-        node=_nearest(plan, off.T[off.worst_axis]),
-        level="warning",
+    yield check(
+        "tip-as-run", "distance of the tool tip from the path as run", off.largest, tip, "m",
+        _nearest(plan, off.T[off.worst]), level="error" if strict else "warning", advice=advice,
+    )  # fmt: skip
+    yield check(
+        "axis-as-run", "angle of the tool axis to that of the path as run",
+        off.axis[off.worst_axis], allowed.axis + cone, "rad",
+        _nearest(plan, off.T[off.worst_axis]), level="warning",
         advice="sample the contour more finely, or smooth its axes",
-    )
+    )  # fmt: skip
 
 
 def _closer(run: Executed, off: PathError, plan: Plan, path: Contour, tip: float) -> str:
@@ -332,16 +298,12 @@ def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Ch
     proved = not run.sampled
     how = "at every instant" if proved else "sampled"
     how += ", corners assumed" if run.controller.assumed else ""
-    return Check(
-        code=f"{what}-as-run",
-        title=f"joint {what} share as run, {how}",
-        value=max(peak.share, bound) if proved else peak.share,
-        limit=1.0 + ZONE_SLACK,
-        unit="share",
-        node=_node(run, plan, peak.time),
-        advice=f"{plan.robot.joint_names[peak.joint]} exceeds its limit, so the controller slows "
-        "down there",
-    )
+    share, joint = max(peak.share, bound) if proved else peak.share, peak.joint
+    slows = "exceeds its limit, so the controller slows down there"
+    return check(
+        f"{what}-as-run", f"joint {what} share as run, {how}", share, 1 + ZONE_SLACK, "share",
+        _node(run, plan, peak.time), advice=f"{plan.robot.joint_names[joint]} {slows}",
+    )  # fmt: skip
 
 
 # -----------------------------------------------------------------------------
@@ -376,15 +338,8 @@ def as_programmed(
 
 
 def _refused(why: str) -> Check:
-    return Check(
-        code="compensation",
-        title="cuts whose targets cannot be moved so that they are executed as drawn",
-        value=1.0,
-        limit=0.0,
-        unit="count",
-        node=0,
-        advice=why,
-    )
+    title = "cuts whose targets cannot be moved so that they are executed as drawn"
+    return count("compensation", title, 1, advice=why)
 
 
 def _compensated(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from kerfpath.arrays import short_repr
-from kerfpath.auditor import Check, Unit, format_value
+from kerfpath.auditor import Check, Level, Unit, format_value
 from kerfpath.cell import Cell, caveats
 from kerfpath.job.format import SequenceTable
 
@@ -17,16 +17,20 @@ SAME_TIME = 2e-3
 """Tolerance (s) of lead times and waits against the job; controllers round them."""
 
 
-def check(code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0) -> Check:
+def check(
+    code: str, title: str, value: float, limit: float, unit: Unit, node: int = 0,
+    *, level: Level = "error", advice: str = "",
+) -> Check:  # fmt: skip
     """Return a row, with plain Python numbers."""
     return Check(
-        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node
-    )
+        code=code, title=title, value=float(value), limit=float(limit), unit=unit, node=node,
+        level=level, advice=advice,
+    )  # fmt: skip
 
 
-def count(code: str, title: str, found: float, node: int = 0) -> Check:
+def count(code: str, title: str, found: float, node: int = 0, *, advice: str = "") -> Check:
     """Return a row that counts faults, of which none is allowed."""
-    return check(code, title, found, 0, "count", node)
+    return check(code, title, found, 0, "count", node, advice=advice)
 
 
 def count_at(code: str, title: str, found: Sequence[int]) -> Check:
