@@ -16,7 +16,7 @@ from benchmarks._figures import Figure, Report
 from kerfpath.job import Goal, Job, warm_up
 from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, job_key, layout
-from kerfpath.study.evaluator import SampledContour
+from kerfpath.study.loaded_job import SampledContour
 from kerfpath.study.placing.grid import PlacementValue
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of
 from kerfpath.study.placing.search import HALF

@@ -18,7 +18,7 @@ from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, pose, read_job
 from kerfpath.study import job_key, layout, ranges_of
-from kerfpath.study.evaluator import EVERY
+from kerfpath.study.loaded_job import EVERY
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of, placed_text
 from kerfpath.study.placing.study import contours_of, nodes_of
 from layouts import CELL, HEAD, contours, job_file, rings, worth

@@ -2,8 +2,7 @@
 
 import sys
 
-from kerfpath.cli.stop import stoppable
-from kerfpath.cli.streams import settle
+from kerfpath.cli.surroundings import settle, stoppable
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.memory import require_memory

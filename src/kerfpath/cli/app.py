@@ -25,7 +25,7 @@ from kerfpath.cli.show import (
     quiet,
     require_output,
 )
-from kerfpath.cli.streams import flush
+from kerfpath.cli.surroundings import flush
 from kerfpath.errors import AuditFailed, InputError, KerfpathError, NoFeasiblePath
 from kerfpath.text import NOT_TEXT, named
 

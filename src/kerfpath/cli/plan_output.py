@@ -26,7 +26,7 @@ from kerfpath.cli.show import (
     show_files,
     table,
 )
-from kerfpath.cli.stop import end_early, ended_early, exit_code
+from kerfpath.cli.surroundings import end_early, ended_early, exit_code
 from kerfpath.execution import Compensation, PathError
 from kerfpath.job import (
     AsRun,

@@ -23,7 +23,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from kerfpath.cli.stop import stop_in_order
+from kerfpath.cli.surroundings import stop_in_order
 from kerfpath.errors import InputError, printable
 from kerfpath.files import require_writable, write_whole
 from kerfpath.progress import Progress, no_progress

@@ -22,8 +22,15 @@ from kerfpath.post import write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import render_table
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
-from kerfpath.study.evaluator import EVERY, Evaluator, SampledContour, out_of_reach, sample_contours
-from kerfpath.study.loaded_job import job_key, load_job
+from kerfpath.study.loaded_job import (
+    EVERY,
+    Evaluator,
+    SampledContour,
+    job_key,
+    load_job,
+    out_of_reach,
+    sample_contours,
+)
 from kerfpath.sweep import Sweep
 
 # -----------------------------------------------------------------------------

@@ -13,8 +13,8 @@ from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
-from kerfpath.job.format.faults import TomlPlaces
 from kerfpath.job.format.tables.table import heads, pose
+from kerfpath.job.format.toml_file import TomlPlaces
 from kerfpath.operations import micro_joints, slow_corners
 from kerfpath.options import PlanOptions
 from kerfpath.post.rapid import RapidSettings

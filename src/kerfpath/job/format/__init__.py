@@ -10,8 +10,6 @@ from kerfpath.job.format.charts import find_chart as find_chart
 from kerfpath.job.format.charts import read_chart as read_chart
 from kerfpath.job.format.charts import user_folder as user_folder
 from kerfpath.job.format.contour import ContourSpec as ContourSpec
-from kerfpath.job.format.faults import all_of as all_of
-from kerfpath.job.format.faults import refusal_at as refusal_at
 from kerfpath.job.format.more_contours import only_loops as only_loops
 from kerfpath.job.format.more_contours import with_loops as with_loops
 from kerfpath.job.format.more_contours import without_contour as without_contour
@@ -56,5 +54,7 @@ from kerfpath.job.format.tables.part import Drawing as Drawing
 from kerfpath.job.format.tables.process import SMALL_HOLE as SMALL_HOLE
 from kerfpath.job.format.tables.table import heads as heads
 from kerfpath.job.format.tables.table import pose as pose
+from kerfpath.job.format.toml_file import all_of as all_of
+from kerfpath.job.format.toml_file import refusal_at as refusal_at
 from kerfpath.job.format.toml_file import toml_lines as toml_lines
 from kerfpath.job.format.toml_file import toml_value as toml_value

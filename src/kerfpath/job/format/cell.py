@@ -31,10 +31,10 @@ from kerfpath.cell import (
     weld,
 )
 from kerfpath.errors import InputError
-from kerfpath.job.format.faults import refusal_at
 from kerfpath.job.format.reading import Job
 from kerfpath.job.format.tables import CellTable, FixtureTable, given
 from kerfpath.job.format.tables.table import pose
+from kerfpath.job.format.toml_file import refusal_at
 from kerfpath.tolerances import SAME_PLACE
 from kerfpath.urdf import read_srdf
 

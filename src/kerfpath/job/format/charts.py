@@ -13,7 +13,6 @@ from pydantic import ValidationError
 
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
-from kerfpath.job.format.faults import error_at, refusal
 from kerfpath.job.format.tables import (
     LONGEST_WORD,
     ChartFile,
@@ -23,7 +22,7 @@ from kerfpath.job.format.tables import (
     tables_in,
 )
 from kerfpath.job.format.tables.table import nearest
-from kerfpath.job.format.toml_file import read_tables, read_text
+from kerfpath.job.format.toml_file import error_at, read_tables, read_text, refusal
 
 FOLDER = "charts"
 """Folder of charts beside a job, and in the user's folder of settings."""

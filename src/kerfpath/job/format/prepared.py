@@ -19,12 +19,12 @@ from kerfpath.errors import InputError
 from kerfpath.front import Subproblem
 from kerfpath.job.format.cell import cell_of_job
 from kerfpath.job.format.contour import ContourSpec
-from kerfpath.job.format.faults import all_of
 from kerfpath.job.format.process import contours_of, sheet_of, with_cuts, with_small_holes
 from kerfpath.job.format.reading import Job
 from kerfpath.job.format.tables import ProgramTable
 from kerfpath.job.format.tables.job import Tolerances
 from kerfpath.job.format.tables.process import NORMAL
+from kerfpath.job.format.toml_file import all_of
 from kerfpath.operations import edge, nearest, quick_turns
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval

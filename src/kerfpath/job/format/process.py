@@ -18,7 +18,6 @@ from pydantic import BaseModel, ValidationError
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
 from kerfpath.job.format.charts import NoRow, choose
-from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.tables import (
     TABLES,
     ContourTable,
@@ -29,6 +28,7 @@ from kerfpath.job.format.tables import (
     StageTable,
 )
 from kerfpath.job.format.tables.process import NORMAL, SMALL_HOLE
+from kerfpath.job.format.toml_file import all_of, refusal, refusal_at
 from kerfpath.post import GASES, ProgramKeywords, ProgramOptions
 
 LEADS = {"lead_in": "lead_in_mm", "lead_out": "lead_out_mm"}

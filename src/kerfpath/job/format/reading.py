@@ -20,7 +20,6 @@ from kerfpath.errors import InputError
 from kerfpath.execution import IDEAL, Correction, Response, read_correction
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
-from kerfpath.job.format.faults import all_of, refusal, refusal_at
 from kerfpath.job.format.process import (
     SmallHoles,
     contours_of,
@@ -43,7 +42,7 @@ from kerfpath.job.format.tables import (
 from kerfpath.job.format.tables.job import Tolerances, said_in_keys
 from kerfpath.job.format.tables.part import Drawing
 from kerfpath.job.format.tables.table import Table, nearest
-from kerfpath.job.format.toml_file import read_tables, read_text
+from kerfpath.job.format.toml_file import all_of, read_tables, read_text, refusal, refusal_at
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, folds, layered_graph
 from kerfpath.post import ProgramOptions, languages

@@ -33,7 +33,7 @@ from kerfpath.planner import plan
 from kerfpath.search import (
     shortest_path,
 )
-from kerfpath.study.evaluator import EVERY, Evaluator, SampledContour
+from kerfpath.study.loaded_job import EVERY, Evaluator, SampledContour
 
 # -----------------------------------------------------------------------------
 # Values of placements, contour by contour, and their comparison.

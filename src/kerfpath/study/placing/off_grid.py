@@ -43,7 +43,7 @@ from kerfpath.search import (
     SearchProblem,
     find_shortest,
 )
-from kerfpath.study.evaluator import SampledContour
+from kerfpath.study.loaded_job import SampledContour
 from kerfpath.study.placing.grid import (
     ContourValue,
     InfeasiblePlacement,

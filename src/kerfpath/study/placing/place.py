@@ -21,7 +21,7 @@ from kerfpath.errors import InputError
 from kerfpath.job import VARIABLES, CutRequest, Job, PreparedJob, pose
 from kerfpath.placement import xyz_rpy
 from kerfpath.robots import ExternalAxis
-from kerfpath.study.evaluator import out_of_reach
+from kerfpath.study.loaded_job import out_of_reach
 
 Numbers = dict[tuple[str | int, ...], list[float]]
 """Changes of a job file for a placement: new values by their path of keys."""

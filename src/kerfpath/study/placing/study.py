@@ -23,8 +23,7 @@ from kerfpath.planner import require_rates_alone
 from kerfpath.post import write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import LayoutEntry, render_layout
-from kerfpath.study.evaluator import SampledContour, sample_contours
-from kerfpath.study.loaded_job import job_key, load_job
+from kerfpath.study.loaded_job import SampledContour, job_key, load_job, sample_contours
 from kerfpath.study.placing.grid import (
     ContourValue,
     PlacementEvaluator,

@@ -588,27 +588,20 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
-    def _technique_of_process(self) -> JobFile:
+    def _process_is_there(self) -> JobFile:
+        """Require [process] where a key needs its rows: a technique, a gas or a price."""
+        if self.process is not None:
+            return self
         for i, table in enumerate(self.contour):
-            if table.technique is not None and self.process is None:
+            if table.technique is not None:
                 expected, remedy = "[process] with technique", "add [process], or remove technique"
                 raise fault(expected, "none", remedy, ("contour", i, "technique"))
-        return self
-
-    @model_validator(mode="after")
-    def _gas_of_process(self) -> JobFile:
-        if self.program.gas_2 is not None and self.process is None:
+        if self.program.gas_2 is not None:
             expected = "[process] with gas_2, whose rows have gases"
             raise fault(expected, "none", "add it, or remove gas_2", ("program", "gas_2"))
-        return self
-
-    @model_validator(mode="after")
-    def _prices_of_process(self) -> JobFile:
-        if self.cost is not None and self.process is None:
-            for name in ("gas_per_m3", "power_per_kwh"):
-                if getattr(self.cost, name) is not None:
-                    expected = f"[process] with {name}, whose rows have gas and power"
-                    raise fault(expected, "none", f"add it, or remove {name}", ("cost", name))
+        for name in () if self.cost is None else given(self.cost, "gas_per_m3", "power_per_kwh"):
+            expected = f"[process] with {name}, whose rows have gas and power"
+            raise fault(expected, "none", f"add it, or remove {name}", ("cost", name))
         return self
 
     @model_validator(mode="after")
