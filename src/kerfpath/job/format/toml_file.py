@@ -23,7 +23,7 @@ from kerfpath.job.format.tables import (
     REPEATED,
     TABLES,
 )
-from kerfpath.job.format.tables.table import FAULT, LARGEST, SMALLEST, nearest
+from kerfpath.job.format.tables.table import FAULT, LARGEST, SMALLEST, example, nearest
 from kerfpath.text import NOT_TEXT, named
 
 # -----------------------------------------------------------------------------
@@ -230,9 +230,9 @@ def _problem(detail: ErrorDetails, tables: Tables) -> str:
         got = "none" if kind == "missing" else _shown(value)
         return f"expected a table {header}, got {got}; write its header and its keys"
     field = tables[table].model_fields[keys[0]]
-    expected, example = field.description, f"{keys[0]} = {(field.examples or [''])[0]}"
+    expected, line = field.description, example(tables[table], keys[0])
     if kind == "missing":
-        return f"expected {expected}, got nothing; add, for example, {example}"
+        return f"expected {expected}, got nothing; add, for example, {line}"
     if kind == "literal_error":
         return f"expected {context['expected']}, got {_shown(value)}; write one of them"
     bound = context.get("le", context.get("ge"))
@@ -240,7 +240,7 @@ def _problem(detail: ErrorDetails, tables: Tables) -> str:
         expected = f"{expected}, at {'most' if 'le' in context else 'least'} {bound:g}"
     last = detail["loc"][-1]
     number = f" as number {last + 1}" if isinstance(last, int) else ""
-    return f"expected {expected}, got {_shown(value)}{number}; write, for example, {example}"
+    return f"expected {expected}, got {_shown(value)}{number}; write, for example, {line}"
 
 
 def _table_of(names: list[str], tables: Tables) -> tuple[str, list[str]]:

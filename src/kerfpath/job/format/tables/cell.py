@@ -237,7 +237,7 @@ class FixtureTable(Table):
     def _one_shape(self) -> FixtureTable:
         what = "one of size_mm (a box), cylinder_mm and file (a mesh or STEP)"
         keys = ("size_mm", "cylinder_mm", "file")
-        require_one(self, keys, what, "size_mm = [1000, 800, 50]")
+        require_one(self, keys, what)
         unit_of(self)
         return self
 
@@ -254,7 +254,7 @@ class PairTable(Table):
     @model_validator(mode="after")
     def _one_rule(self) -> PairTable:
         what = "one of near_miss_mm (how near they may come) and allowed (why they may touch)"
-        require_one(self, ("near_miss_mm", "allowed"), what, "near_miss_mm = 2")
+        require_one(self, ("near_miss_mm", "allowed"), what)
         return self
 
 

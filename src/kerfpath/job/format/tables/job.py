@@ -42,6 +42,7 @@ from kerfpath.job.format.tables.table import (
     Positive,
     Table,
     Text,
+    example,
     fault,
     fault_in_words,
     fields_of,
@@ -506,10 +507,9 @@ def _settings(name: str, table: Any) -> LanguageSettings:
         got = "an unknown name" if at else f"{table!r}"
         remedy = nearest(at, list(model.model_fields))
         raise fault(f"a key of [program.{name}]", got, remedy, (name, *([at] if at else [])))
-    field = model.model_fields[at]
-    remedy = f"write, for example, {at} = {(field.examples or [''])[0]}"
-    got = f"{detail['input']!r}"[:60]
-    raise fault(field.description or "another value", got, remedy, (name, at))
+    said, got = model.model_fields[at].description, f"{detail['input']!r}"[:60]
+    remedy = f"write, for example, {example(model, at)}"
+    raise fault(said or "another value", got, remedy, (name, at))
 
 
 class AuditTable(create_model("AuditKeys", __base__=Table, **fields_of(Tolerances))):  # type: ignore[misc]  # made
@@ -581,9 +581,8 @@ class JobFile(Table):
             return self
         for i, table in enumerate(self.contour):
             if table.speed_m_min is None:
-                field = ContourTable.model_fields["speed_m_min"]
-                said, example = str(field.description), (field.examples or [""])[0]
-                remedy = f"add, for example, speed_m_min = {example}"
+                said = str(ContourTable.model_fields["speed_m_min"].description)
+                remedy = f"add, for example, {example(ContourTable, 'speed_m_min')}"
                 raise fault(said, "nothing", remedy, ("contour", i, "speed_m_min"))
         return self
 

@@ -517,7 +517,7 @@ class ContourTable(Table):
     @model_validator(mode="after")
     def _one_pick(self) -> ContourTable:
         what = "pick (a loop's name) or [contour.pick_all]"
-        require_one(self, ("pick", "pick_all"), what, 'pick = "trim"')
+        require_one(self, ("pick", "pick_all"), what)
         if self.pick_all is not None and self.name is not None:
             raise fault("name only with pick", "it with pick_all", "remove name", ("name",))
         return self

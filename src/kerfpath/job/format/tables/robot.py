@@ -30,6 +30,7 @@ from kerfpath.job.format.tables.table import (
     Table,
     Text,
     Three,
+    example,
     existing,
     fault,
     fault_in_words,
@@ -74,10 +75,6 @@ FACTORS = {"linear": 1e-3, "rotary": float(np.pi / 180)}
 NAME = r"^[A-Za-z][A-Za-z0-9_]{0,15}$"
 WHOLE = ("kind", "carries", "axis", "point_mm", "xyz_mm", "rpy_deg")
 """Keys that define an axis and its place; a joint of a description has all of them."""
-EXAMPLES = {
-    "lower_mm": "-2000", "upper_mm": "2000", "velocity_mm_s": "1000", "acceleration_mm_s2": "1500",
-    "lower_deg": "-180", "upper_deg": "180", "velocity_deg_s": "120", "acceleration_deg_s2": "200",
-}  # fmt: skip
 
 
 class ExternalTable(Table):
@@ -173,7 +170,7 @@ class ExternalTable(Table):
         values: list[float | None] = [getattr(self, name) for name in KEYS[kind][:5]]
         for name, value, there in zip(KEYS[kind], values, limits, strict=False):
             if value is None and there is None and not (free and name in (lower, upper)):
-                hint = f"add, for example, {name} = {EXAMPLES[name]}"
+                hint = f"add, for example, {example(ExternalTable, name)}"
                 raise fault("every limit of the axis", f"no {name}", hint, (name,))
         low, high, velocity, acceleration, step = (
             None if value is None else factor * value for value in values
@@ -210,9 +207,9 @@ class ExternalTable(Table):
         """Return the axis that the table describes completely, without its limits."""
         for name in ("name", "kind", "carries", "axis"):
             if getattr(self, name) is None:
-                field = type(self).model_fields[name]
-                example = f"add, for example, {name} = {(field.examples or [''])[0]}"
-                raise fault(f"{field.description}", "nothing", example, (name,))
+                said = f"{ExternalTable.model_fields[name].description}"
+                hint = f"add, for example, {example(ExternalTable, name)}"
+                raise fault(said, "nothing", hint, (name,))
         for name in given(self, "xyz_mm", "rpy_deg"):
             raise fault(f"{name} only with model", "it without model", f"remove {name}", (name,))
         assert self.name is not None
@@ -243,10 +240,11 @@ class ExternalTable(Table):
         if measured:
             axis = replace(known.axis, axis=self._direction(), point=self._point(kind))
             return replace(known, axis=axis)
-        for name, example in (("xyz_mm", "[1600, 0, 0]"), ("rpy_deg", "[0, 0, 90]")):
+        for name in ("xyz_mm", "rpy_deg"):
             if getattr(self, name) is None and not (kind == "linear" and name == "xyz_mm"):
                 expected = "the place of the product, or its axis as measured"
-                raise fault(expected, "neither", f"add, for example, {name} = {example}", (name,))
+                hint = f"add, for example, {example(ExternalTable, name)}"
+                raise fault(expected, "neither", hint, (name,))
         return known.placed(pose(self.xyz_mm or (0, 0, 0), self.rpy_deg or (0, 0, 0)))
 
     def _direction(self) -> Array:

@@ -215,7 +215,12 @@ def given(table: Table, *keys: str) -> list[str]:
     return [key for key in keys if getattr(table, key) is not None]
 
 
-def require_one(table: Table, keys: Sequence[str], expected: str, example: str) -> None:
+def example(table: type[BaseModel], name: str) -> str:
+    """Return a line of a table: a key, and its example as the value."""
+    return f"{name} = {(table.model_fields[name].examples or [''])[0]}"
+
+
+def require_one(table: Table, keys: Sequence[str], expected: str) -> None:
     """Require one of several optional keys.
 
     Raises
@@ -225,7 +230,8 @@ def require_one(table: Table, keys: Sequence[str], expected: str, example: str) 
     """
     found = given(table, *keys)
     if len(found) != 1:
-        got, remedy = ("both", "remove one") if found else ("none", f"add, for example, {example}")
+        added = f"add, for example, {example(type(table), keys[0])}"
+        got, remedy = ("both", "remove one") if found else ("none", added)
         raise fault(expected, got, remedy, (keys[0],))
 
 
