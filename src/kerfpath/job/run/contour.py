@@ -76,14 +76,7 @@ def plan_candidate(
     """
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
-    name, total, done = request.task.name, len(candidate.nodes), 0
-    phase = name
-
-    def solved(count: int) -> None:
-        nonlocal done
-        may_stop()
-        done += count
-        progress(name, done, total)
+    name = phase = request.task.name
 
     def begin(what: str) -> None:
         nonlocal phase
@@ -93,7 +86,7 @@ def plan_candidate(
     def show(done: int, total: int) -> None:
         progress(phase, done, total)
 
-    progress(name, 0, total)
+    solved = _counting(name, len(candidate.nodes), progress)
     run, asked = request.run, request.task.asked(prepared.job.options)
     if not follows_courses(job.robot, asked):
         folded_at = None if run is not None else candidate.dt
@@ -141,6 +134,20 @@ def plan_candidate(
     except NoFeasiblePath as broken:
         return (replace(whole, broken=broken),)
     return _cuts_of(prepared, whole, plans, begin)
+
+
+def _counting(what: str, total: int, progress: Progress) -> Callable[[int], None]:
+    """Return what is called with counts of solved nodes, and shows how many of all are done."""
+    done = 0
+
+    def solved(count: int) -> None:
+        nonlocal done
+        may_stop()
+        done += count
+        progress(what, done, total)
+
+    progress(what, 0, total)
+    return solved
 
 
 def _whole(
@@ -252,20 +259,12 @@ def unplanned(
 
     The robot has no free joints.
     """
-    name, done = request.task.name, 0
-
-    def solved(count: int) -> None:
-        nonlocal done
-        may_stop()
-        done += count
-        progress(name, done, len(candidate.nodes))
-
-    progress(name, 0, len(candidate.nodes))
+    solved = _counting(request.task.name, len(candidate.nodes), progress)
     job = replace(prepared.job, options=replace(request.options, certify=None))
     graph = job.graph(candidate.nodes, folded_at=candidate.dt, progress=solved)
     return _whole(
         job, request, candidate, graph, prepared.cell,
-        lambda what: progress(f"{name}: {what}", 0, 0),
+        lambda what: progress(f"{request.task.name}: {what}", 0, 0),
     )  # fmt: skip
 
 
