@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -582,9 +583,9 @@ def expect_program(
             for step in section.steps
         ]
         if options.zone == "auto":
-            steps = _with_zones(steps, cut, requested)
+            steps = _with_read(steps, cut, requested, "zone", share=ZONE_STEP, more=POINT)
         if job.compensation is not None:
-            steps = _with_speeds(steps, cut, requested)
+            steps = _with_read(steps, cut, requested, "speed", share=SAME_SPEED)
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, requested)
         sections.append(replace(section, steps=tuple(steps)))
@@ -672,33 +673,24 @@ def _same_pose(program: Program, requested: Array, approach: Array, rules: Rules
     return read if near and np.abs(requested - read).max() <= SAME_BRANCH else requested
 
 
-def _with_zones(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> list[Step]:
-    """Return the steps of a cut with the zones that were read, if they are one step away.
+def _with_read(
+    steps: Sequence[Step], cut: ReadCut, requested: TargetNodes, name: Literal["zone", "speed"],
+    *, share: float, more: float = 0.0,
+) -> list[Step]:  # fmt: skip
+    """Return the steps of a cut with the zones or speeds that were read, if they are nearly alike.
 
-    Zones are rounded to steps, and digits of targets may lead to the next step.
+    They may differ by a share of the value that the job asks for, and by `more`: zones are rounded
+    to steps, and digits of targets may lead to the next step; between moved targets, speeds depend
+    on the places of nodes that were left out.
     """
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found = list(steps)
     for k, move in zip((path[node] for node in requested.at), cut.targets, strict=True):
         step = found[k]
         assert isinstance(step, LinearMove)
-        if move.zone and abs(move.zone - step.zone) <= ZONE_STEP * step.zone + POINT:
-            found[k] = replace(step, zone=move.zone)
-    return found
-
-
-def _with_speeds(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> list[Step]:
-    """Return the steps of a cut with the speeds that were read, if they are nearly the same.
-
-    Between moved targets, speeds depend on the places of nodes that were left out.
-    """
-    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
-    found = list(steps)
-    for k, move in zip((path[node] for node in requested.at), cut.targets, strict=True):
-        step = found[k]
-        assert isinstance(step, LinearMove)
-        if move.speed and abs(move.speed - step.speed) <= SAME_SPEED * step.speed:
-            found[k] = replace(step, speed=move.speed)
+        said, asked = getattr(move, name), getattr(step, name)
+        if said and abs(said - asked) <= share * asked + more:
+            found[k] = replace(step, **{name: said})
     return found
 
 

@@ -51,6 +51,8 @@ ENDLESS = 60.0
 What = Literal["air", "approach", "start", "cut", "end", "retract"]
 _Found = tuple[float, int]
 """A value and the step of the program that it is of."""
+_Times = list[tuple[float, float, int]]
+"""From when to when (s) something is on, and the step of the program that switched it so."""
 WORDS: dict[What, str] = {
     "air": "laser on in a transfer move, or while the robot waits there",
     "approach": "laser on during the approach",
@@ -167,9 +169,7 @@ def check_laser_and_gas(
     return rows + _gas(spans, events, beam, switched=process.gas_lead is not None)
 
 
-def _row(
-    code: str, title: str, found: Sequence[tuple[float, int]], limit: float, unit: Unit
-) -> Check:
+def _row(code: str, title: str, found: Sequence[_Found], limit: float, unit: Unit) -> Check:
     """Return a check of the largest of values with their steps; counts are summed."""
     value, step = max(found, default=(0.0, 0), key=lambda one: (one[0], -one[1]))
     if unit == "count":
@@ -258,11 +258,9 @@ def _took(move: ReadMove, robot: Robot, q: object, T: object) -> float:
     return float(np.linalg.norm(way)) / move.speed
 
 
-def _on(
-    events: Sequence[_Event], signal: Signal, *, shift: float
-) -> list[tuple[float, float, int]]:
+def _on(events: Sequence[_Event], signal: Signal, *, shift: float) -> _Times:
     """Return from when to when (s) a signal is on, and the step that switched it so."""
-    found: list[tuple[float, float, int]] = []
+    found: _Times = []
     since: tuple[float, int] | None = None
     for event in events:
         if event.signal != signal:
@@ -277,16 +275,12 @@ def _on(
     return found
 
 
-def _overlap(start: float, end: float, on: Sequence[tuple[float, float, int]]) -> float:
+def _overlap(start: float, end: float, on: _Times) -> float:
     """Return for how long (s) of a span something is on."""
     return sum(max(min(end, off) - max(start, one), 0.0) for one, off, _ in on)
 
 
-def _wrongly(
-    spans: Sequence[_Span],
-    beam: Sequence[tuple[float, float, int]],
-    what: What,
-) -> list[tuple[float, int]]:
+def _wrongly(spans: Sequence[_Span], beam: _Times, what: What) -> list[_Found]:
     """Return for how long (s) the beam is on where it must not be, and the step there.
 
     A beam that begins in one span and ends in the next is counted in each.
@@ -305,9 +299,7 @@ def _wrongly(
     return found
 
 
-def _stops(
-    spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]]
-) -> list[tuple[float, int]]:
+def _stops(spans: Sequence[_Span], beam: _Times) -> list[_Found]:
     """Return the inner targets of cuts where the robot stops and the beam stays on."""
     moves = [span for span in spans if span.move is not None]
     stops = [a for a, b in pairwise(moves) if a.what == b.what == "cut"]
@@ -319,9 +311,7 @@ def _stops(
     ]
 
 
-def _borders(
-    spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]]
-) -> list[tuple[float, int]]:
+def _borders(spans: Sequence[_Span], beam: _Times) -> list[_Found]:
     """Return where a cut continues in another file while the beam is on."""
     moves = [span for span in spans if span.move is not None]
     return [
@@ -333,11 +323,11 @@ def _borders(
     ]
 
 
-def _through(time: float, on: Sequence[tuple[float, float, int]]) -> bool:
+def _through(time: float, on: _Times) -> bool:
     return any(one < time - SAME_TIME and time + SAME_TIME < off for one, off, _ in on)
 
 
-def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
+def _idle(events: Sequence[_Event]) -> list[_Found]:
     """Return the switches that change nothing: another is missing, or acts too early or late."""
     state = dict.fromkeys(LIT, False)
     found = []
@@ -349,11 +339,7 @@ def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
 
 
 def _gas(
-    spans: Sequence[_Span],
-    events: Sequence[_Event],
-    beam: Sequence[tuple[float, float, int]],
-    *,
-    switched: bool,
+    spans: Sequence[_Span], events: Sequence[_Event], beam: _Times, *, switched: bool
 ) -> list[Check]:
     """Return the checks that the gas flows before and with the beam, and nowhere else."""
     if not switched:
@@ -384,9 +370,7 @@ def _gas(
     ]
 
 
-def _both(
-    one: Sequence[tuple[float, float, int]], two: Sequence[tuple[float, float, int]]
-) -> list[tuple[float, float, int]]:
+def _both(one: _Times, two: _Times) -> _Times:
     """Return the times when both are on."""
     found = [(max(a, c), min(b, d), step) for a, b, step in one for c, d, _ in two]
     return [(start, end, step) for start, end, step in found if end > start]
