@@ -86,8 +86,8 @@ class RobotData(TypedDict):
     chain: ChainData | None
 
 
-class ExternalData(TypedDict):
-    """An external axis and its limits, in its unit, per s and s^2."""
+class AxisData(TypedDict):
+    """An external axis."""
 
     name: str
     kind: Literal["linear", "rotary"]
@@ -96,11 +96,20 @@ class ExternalData(TypedDict):
     axis: Row
     point_m: Row
     step: float | None
+
+
+class TravelData(TypedDict):
+    """The limits of an external axis, in its unit, per s and s^2."""
+
     lower: float
     upper: float
     velocity: float
     acceleration: float
     endless: bool
+
+
+class ExternalData(AxisData, TravelData):
+    """An external axis and its limits."""
 
 
 class CouplingData(TypedDict):
@@ -786,20 +795,14 @@ def external_entries(robot: Robot) -> list[ExternalData]:
         return []
     limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
     return [
-        ExternalData(
-            name=axis.name,
-            kind=axis.kind,
-            carries=axis.carries,
-            unit=axis.unit,
-            axis=axis.axis.tolist(),
-            point_m=axis.point.tolist(),
-            step=axis.step,
-            lower=float(limits.lower[i]),
-            upper=float(limits.upper[i]),
-            velocity=float(velocity[i]),
-            acceleration=float(acceleration[i]),
-            endless=bool(robot.endless[i]),
-        )
+        {
+            **cast(AxisData, _written(AxisData, axis)),
+            "lower": float(limits.lower[i]),
+            "upper": float(limits.upper[i]),
+            "velocity": float(velocity[i]),
+            "acceleration": float(acceleration[i]),
+            "endless": bool(robot.endless[i]),
+        }
         for i, axis in enumerate(robot.externals, robot.family.joints)
     ]
 
@@ -807,22 +810,9 @@ def external_entries(robot: Robot) -> list[ExternalData]:
 def add_externals(entries: list[ExternalData], robot: Robot) -> Robot:
     """Return the arm with the external axes of such entries."""
     for entry in entries:
-        axis = ExternalAxis(
-            name=entry["name"],
-            kind=entry["kind"],
-            carries=entry["carries"],
-            axis=np.array(entry["axis"]),
-            point=np.array(entry["point_m"]),
-            step=entry["step"],
-        )
-        robot = robot.with_external(
-            axis,
-            lower=entry["lower"],
-            upper=entry["upper"],
-            velocity=entry["velocity"],
-            acceleration=entry["acceleration"],
-            endless=entry["endless"],
-        )
+        own = _read(AxisData, entry)
+        del own["unit"]  # that of its kind
+        robot = robot.with_external(ExternalAxis(**own), **_read(TravelData, entry))
     return robot
 
 
