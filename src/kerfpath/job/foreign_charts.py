@@ -22,6 +22,7 @@ from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
 from kerfpath.isolated import call_apart
 from kerfpath.job.format import ChartFile, RowTable, toml_lines
+from kerfpath.job.format.toml_file import decoded, require_glyphs
 from kerfpath.text import NOT_TEXT, named
 
 MOST_BYTES = 10_000_000
@@ -164,18 +165,8 @@ def _bytes(file: Path) -> bytes:
 
 
 def _text(file: Path) -> str:
-    raw = _bytes(file)
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            f"{file}:{line}: expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the "
-            "file as UTF-8"
-        ) from None
-    if (found := NOT_TEXT.search(text)) is not None:
-        line = text.count("\n", 0, found.start()) + 1
-        raise InputError(f"{file}:{line}: expected text, got {named(found[0])}; remove it")
+    text = decoded(file, _bytes(file))
+    require_glyphs(file, text)
     return text
 
 

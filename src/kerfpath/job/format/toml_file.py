@@ -319,22 +319,29 @@ def read_text(path: Path, what: str) -> str:
         raise error_at(path, None, f"cannot be read ({why}); give the path of {what}") from None
     if endless:
         raise error_at(path, None, f"is not a file; give the path of {what}")
+    return decoded(path, raw)
+
+
+def decoded(path: Path, raw: bytes) -> str:
+    """Return the text that a file in UTF-8 holds, or raise InputError at the line that is none."""
     try:
         return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
-        raise error_at(
-            path,
-            line,
-            f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the file as UTF-8",
-        ) from None
+        said = f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}"
+        raise error_at(path, line, f"{said}; save the file as UTF-8") from None
+
+
+def require_glyphs(path: Path, text: str) -> None:
+    """Raise InputError for a character without a glyph in a file."""
+    if (found := NOT_TEXT.search(text)) is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        raise error_at(path, line, f"expected text, got {named(found[0])}; remove it")
 
 
 def _require_text(path: Path, text: str, tables: Mapping[str, Any]) -> None:
     """Raise InputError for a character without a glyph in the file, or in a string of it."""
-    if (found := NOT_TEXT.search(text)) is not None:
-        line = text.count("\n", 0, found.start()) + 1
-        raise error_at(path, line, f"expected text, got {named(found[0])}; remove it")
+    require_glyphs(path, text)
 
     def look(value: Any, key: tuple[str | int, ...]) -> None:
         if isinstance(value, dict | list):
