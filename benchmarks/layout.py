@@ -17,7 +17,7 @@ from kerfpath.job import Goal, Job, warm_up
 from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, job_key, layout
 from kerfpath.study.loaded_job import SampledContour
-from kerfpath.study.placing.grid import PlacementValue
+from kerfpath.study.placing.evaluators import PlacementValue
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of
 from kerfpath.study.placing.search import HALF
 from kerfpath.study.placing.study import contours_of, evaluate_placements, nodes_of

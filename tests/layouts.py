@@ -7,7 +7,7 @@ import numpy as np
 from conftest import ROOT
 from jobs import ENDLESS_AND_HEAD, ROBOT_AND_HEAD
 from kerfpath.study import job_key
-from kerfpath.study.placing.grid import PlacementValue
+from kerfpath.study.placing.evaluators import PlacementValue
 from kerfpath.study.placing.study import evaluate_placements
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"

@@ -24,7 +24,7 @@ from kerfpath.study import (
     write_pareto,
 )
 from kerfpath.study.placing import placement_of
-from kerfpath.study.placing.grid import is_estimated
+from kerfpath.study.placing.evaluators import is_estimated
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of, placed_text
 from layouts import job_file, worth
 

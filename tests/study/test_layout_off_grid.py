@@ -11,8 +11,7 @@ from commands import run
 from kerfpath.job import fastest_along, read_job
 from kerfpath.planner import plan
 from kerfpath.study import job_key, layout
-from kerfpath.study.placing.grid import is_estimated
-from kerfpath.study.placing.off_grid import leaves_grid
+from kerfpath.study.placing.evaluators import is_estimated, leaves_grid
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of
 from kerfpath.study.placing.study import contours_of, nodes_of
 from layouts import CELL, HEAD, contours, job_file, rings, worth

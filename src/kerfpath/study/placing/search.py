@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, differential_evolution
 from kerfpath.arrays import Array, short_repr
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress
-from kerfpath.study.placing.grid import (
+from kerfpath.study.placing.evaluators import (
     BOUND_ROUNDING,
     PlacementValue,
     is_better,

@@ -24,16 +24,17 @@ from kerfpath.post import write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import LayoutEntry, render_layout
 from kerfpath.study.loaded_job import SampledContour, job_key, load_job, sample_contours
-from kerfpath.study.placing.grid import (
+from kerfpath.study.placing.evaluators import (
     ContourValue,
+    OffGridEvaluator,
     PlacementEvaluator,
     PlacementValue,
     Stage,
     is_better,
     is_estimated,
+    leaves_grid,
     worst_of,
 )
-from kerfpath.study.placing.off_grid import OffGridEvaluator, leaves_grid
 from kerfpath.study.placing.place import (
     DEFAULT_RANGES,
     Numbers,
