@@ -17,7 +17,7 @@ from ezdxf.filemanagement import new
 
 from benchmarks._figures import Figure, Report, peak_megabytes
 from kerfpath.job import read_job, run_job
-from kerfpath.job.output import write_result
+from kerfpath.job.output.writing import write_result
 
 __all__ = ["run", "write_nest"]
 

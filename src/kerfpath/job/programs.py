@@ -33,7 +33,7 @@ from kerfpath.job.format import (
     read_job,
 )
 from kerfpath.job.plan_file import PlanFile, read_plan_file
-from kerfpath.job.run import CutResult
+from kerfpath.job.run.results import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan, TransferMove
 from kerfpath.post import ProgramIssue, ProgramOptions, build_program, dry_run, post_and_read

@@ -18,7 +18,9 @@ from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, prepare
 from kerfpath.job.plan_file import PlanFile, plan_entry, read_plan_file
 from kerfpath.job.program_file import add_tips, in_language_of, program_on_disk
 from kerfpath.job.programs import expected_of_plans, program_of
-from kerfpath.job.run import CutResult, JobResult, cut_as_before, run_again
+from kerfpath.job.run.contour import cut_as_before
+from kerfpath.job.run.job import run_again
+from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
 from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program

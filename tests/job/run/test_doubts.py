@@ -13,8 +13,7 @@ from commands import run
 from kerfpath import cad
 from kerfpath.contour import Contour
 from kerfpath.job import read_job
-from kerfpath.job.run import sides_in_doubt
-from kerfpath.job.run.foresee import both_sides
+from kerfpath.job.run.foresee import both_sides, sides_in_doubt
 
 HEIGHT, WALL = 60.0, 3.0
 

@@ -8,7 +8,7 @@ import pytest
 from commands import run
 from jobs import SLIT_JOB, SLITS
 from kerfpath.job import prepare, read_job, run_prepared
-from kerfpath.job.output import result_texts
+from kerfpath.job.output.writing import result_texts
 
 FREE = SLIT_JOB.replace("[plan]", "[plan]\ncertify = false").replace(
     "step_deg = 15", "step_deg = 5"

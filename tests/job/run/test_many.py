@@ -5,7 +5,7 @@ import pytest
 
 from kerfpath.crew import Crew
 from kerfpath.job import read_job, run_job
-from kerfpath.job.output import write_result
+from kerfpath.job.output.writing import write_result
 from kerfpath.job.run import job as module
 from kerfpath.sequence import part as sequence
 

@@ -13,7 +13,7 @@ from kerfpath import audit, robot
 from kerfpath.cad import read
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.job import audit_file, program_from_file, read_job, read_plan_file, run_job
-from kerfpath.job.output import write_result
+from kerfpath.job.output.writing import write_result
 from programs import read_text
 
 

@@ -8,7 +8,7 @@ import pytest
 from jobs import DEMO, SMALL
 from kerfpath import InputError
 from kerfpath.job import Audit, advised, prepare, read_job, run_job
-from kerfpath.job.output import plan_file_text
+from kerfpath.job.output.writing import plan_file_text
 from kerfpath.progress import no_progress
 
 

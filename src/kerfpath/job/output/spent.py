@@ -18,7 +18,7 @@ from kerfpath.errors import InputError
 from kerfpath.execution import PowerAlong, power_along
 from kerfpath.job.as_run import programmed
 from kerfpath.job.format import CostTable, Job, JobRowTable, ProcessTable, full_power
-from kerfpath.job.run import CutResult, JobResult
+from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.post import build_program, laser_start
 
 LITRES, JOULES, SECONDS = 1e3, 3.6e6, 3600.0

@@ -28,7 +28,8 @@ from kerfpath.job.plan_file import (
     plan_text,
 )
 from kerfpath.job.programs import expected_of_cuts, program_of
-from kerfpath.job.run import CutResult, JobResult, sides_in_doubt
+from kerfpath.job.run.foresee import sides_in_doubt
+from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.plans import Plan, TransferMove, joint_columns
 from kerfpath.post import (
     MANIFEST,

@@ -16,7 +16,6 @@ from kerfpath.job.format.tables.job import AuditTable as AuditTable
 from kerfpath.job.format.tables.job import Goal as Goal
 from kerfpath.job.format.tables.job import JobFile as JobFile
 from kerfpath.job.format.tables.job import LayoutTable as LayoutTable
-from kerfpath.job.format.tables.job import PlanTable as PlanTable
 from kerfpath.job.format.tables.job import ProgramTable as ProgramTable
 from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
 from kerfpath.job.format.tables.job import tables_in as tables_in
