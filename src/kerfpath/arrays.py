@@ -226,6 +226,8 @@ FEW = 6
 """Most numbers of an array, or items of a collection, that are all shown."""
 SHORT = 40
 """Most characters of a text, or of a collection whose items are shown."""
+SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
+"""For the unit of a joint: the factor to the unit that people and files see, and that unit."""
 
 
 def spread(count: int, most: int) -> Ints:
@@ -272,7 +274,7 @@ def html_table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]
 def in_degrees(value: float, unit: str) -> str:
     """Return a value in rad or m, or per s or s^2, in deg or mm: "12.50 deg/s", "40.00 mm"."""
     of, slash, per = unit.partition("/")
-    factor, word = (180 / np.pi, "deg") if of == "rad" else (1e3, "mm")
+    factor, word = SHOWN_UNITS[of]
     return f"{factor * value:.2f} {word}{slash}{per}"
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
-from kerfpath.arrays import counted
+from kerfpath.arrays import SHOWN_UNITS, counted
 from kerfpath.auditor import format_value
 from kerfpath.cad import read_measured
 from kerfpath.cli.drawing_output import drawing_of
@@ -419,10 +419,10 @@ def _run_page(done: ControllerRun, program: Path, rows: list[list[str]]) -> str:
 def _record_text(done: ControllerRun) -> str:
     """Return the record as CSV: time, joints, line of the program, outputs."""
     record, robot = done.record, done.robot
-    scale = [np.degrees(1.0) if unit == "rad" else 1e3 for unit in robot.units]
-    names = joint_identifiers(robot)
-    units = ["deg" if unit == "rad" else "mm" for unit in robot.units]
-    axes = [f"{name}_{unit}" for name, unit in zip(names, units, strict=True)]
+    shown = [SHOWN_UNITS[unit] for unit in robot.units]
+    scale = [factor for factor, _ in shown]
+    names = zip(joint_identifiers(robot), shown, strict=True)
+    axes = [f"{name}_{unit}" for name, (_, unit) in names]
     lines = [",".join(["t_s", *axes, "line", "laser", "gas"])]
     columns = np.c_[record.time, record.q * scale, record.line, record.laser, record.gas]
     text = ",".join(["%.3f", *["%.6f"] * robot.joints, "%d", "%d", "%d"])

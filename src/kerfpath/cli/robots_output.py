@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import SHOWN_UNITS, Array
 from kerfpath.cli.show import out, print_json, table, write_text
 from kerfpath.errors import InputError
 from kerfpath.robots import (
@@ -114,7 +114,7 @@ def show_external(name: str) -> None:
 def _in_unit(each: KnownAxis, limit: str) -> tuple[float | None, str]:
     """Return a limit in mm or deg, None where it is not known, and its unit."""
     value: float | None = getattr(each, limit)
-    unit, factor = ("mm", 1e3) if each.axis.kind == "linear" else ("deg", 180 / np.pi)
+    factor, unit = SHOWN_UNITS[each.axis.unit]
     # Data sheets are in these units; conversion to m or rad and back adds spurious digits.
     return None if value is None else round(factor * value, 9), unit + UNITS[limit]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from typing import Unpack
@@ -11,6 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
+from kerfpath.arrays import SHOWN_UNITS
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
@@ -111,8 +111,7 @@ def _joints(plan: Plan) -> Iterator[tuple[str, str, Sequence[str]]]:
     """Yield the colour and name of each joint, and its criteria and peaks."""
     robot, c = plan.robot, plan.criteria
     for i, name in enumerate(robot.joint_names):
-        is_linear = robot.units[i] == "m"
-        scale = 1e3 if is_linear else 180 / math.pi
+        scale, unit = SHOWN_UNITS[robot.units[i]]
         values = (
             number(scale * c.displacement[i], 1),
             number(scale * c.largest_increment[i], 3),
@@ -120,7 +119,7 @@ def _joints(plan: Plan) -> Iterator[tuple[str, str, Sequence[str]]]:
             number(c.peak_velocity[i] * 100, 1),
             number(c.peak_acceleration[i] * 100, 1),
         )
-        yield joint_colours(robot)[i], f"{name}, mm" if is_linear else name, values
+        yield joint_colours(robot)[i], f"{name}, {unit}" if unit == "mm" else name, values
 
 
 def _margin(plan: Plan, measure: str) -> float:

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath.arrays import Array, Ints
+from kerfpath.arrays import SHOWN_UNITS, Array, Ints
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, measure
 from kerfpath.contour import Contour
@@ -50,9 +50,6 @@ KINDS = {
     Loss.PINNED: "pinned",
 }
 """The kind that decides the colour of each loss; losses that are not listed are "other"."""
-
-UNITS = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
-"""Factor from the SI unit to the unit that is shown, and that unit."""
 
 
 def map_id(graph: LayeredGraph) -> str:
@@ -147,7 +144,7 @@ def _along(robot: Robot, graph: LayeredGraph, cuts: Sequence[CutResult]) -> str:
     if all(cut.plan is not None for cut in cuts):
         return f"The map has {names} where the plan has them."
     if (x == x[0]).all():
-        held = (UNITS[axis.unit] for axis in robot.externals)
+        held = (SHOWN_UNITS[axis.unit] for axis in robot.externals)
         at = (f"{by * value:g} {unit}" for (by, unit), value in zip(held, x[0, 0], strict=True))
         return f"No plan: the map has {names} at rest, at {' and '.join(at)}."
     return f"No plan: the map follows the most promising course of {names}."

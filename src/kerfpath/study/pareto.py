@@ -13,7 +13,7 @@ from typing import TypedDict
 import numpy as np
 
 from kerfpath import __version__
-from kerfpath.arrays import short_repr
+from kerfpath.arrays import SHOWN_UNITS, short_repr
 from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
@@ -395,7 +395,7 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
     ]
     for joint, (low, high) in enumerate(run.window):
         if np.isfinite(high - low):
-            factor, unit = (1e3, "mm") if robot.units[joint] == "m" else (180 / np.pi, "deg")
+            factor, unit = SHOWN_UNITS[robot.units[joint]]
             span = f"{low * factor:.1f} to {high * factor:.1f} {unit}"
             rows.append((f"window of {robot.joint_names[joint]}", span))
     if run.clearance:

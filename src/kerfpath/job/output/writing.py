@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kerfpath.arrays import Array, short_repr
+from kerfpath.arrays import SHOWN_UNITS, Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.execution import with_power
@@ -285,7 +285,7 @@ def _external_facts(robot: Robot) -> list[tuple[str, str]]:
     limits, n = robot.joint_limits(), robot.arm.joints
     facts = []
     for i, axis in enumerate(robot.externals, n):
-        scale, unit = (1e3, "mm") if axis.unit == "m" else (180 / np.pi, "deg")
+        scale, unit = SHOWN_UNITS[axis.unit]
         low, high, velocity, acceleration = (
             f"{scale * values[i]:.6g}"
             for values in (limits.lower, limits.upper, *robot.speed_limits())
@@ -708,9 +708,8 @@ def _no_formula(name: str) -> str:
 def _joint_header(plans: Sequence[Plan]) -> list[str]:
     if not plans:
         return [f"q{i}_deg" for i in range(1, 7)]
-    robot, shown = plans[0].robot, {"m": "mm", "rad": "deg"}
-    names = zip(joint_columns(robot), robot.units, strict=True)
-    return [f"{name}_{shown[unit]}" for name, unit in names]
+    names = zip(joint_columns(plans[0].robot), plans[0].robot.units, strict=True)
+    return [f"{name}_{SHOWN_UNITS[unit][1]}" for name, unit in names]
 
 
 def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:
@@ -723,4 +722,4 @@ def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:
 
 def _shown(plan: Plan) -> Array:
     """Return the factors (n,) that convert joints to degrees, and linear axes to mm."""
-    return np.array([1e3 if unit == "m" else 180 / np.pi for unit in plan.robot.units])
+    return np.array([SHOWN_UNITS[unit][0] for unit in plan.robot.units])
