@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks._random_contours import Cut
 from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.kernels.frames import location
-from kerfpath.kernels.kinematics import POSTURES, OpwArm, inverse
+from kerfpath.kernels.kinematics import EVERY, POSTURES, OpwArm, inverse
 from kerfpath.kernels.turns import JointLimits
 
 __all__ = ["Followed", "Follower", "Task", "edge_cost"]
@@ -57,7 +57,7 @@ def poses(task: Task, H: Array, gamma: float, out_q: Array, out_ok: Bools) -> No
             for i in range(3):
                 T[r, c] += L[r, i] * task.T_tip_flange[i, c]
         T[r, 3] += L[r, 3]
-    inverse(task.arm, T, out_q, out_ok)
+    inverse(task.arm, T, EVERY, out_q, out_ok)
     limits = task.limits
     for mu in range(POSTURES):
         for i in range(6):

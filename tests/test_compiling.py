@@ -22,7 +22,7 @@ class Listener(event.Listener):
 
 event.register("numba:compile", Listener())
 from kerfpath import compiling
-assert compiling.warm_up({kinematics!r}, later=compiling.FOR_BOUNDS)
+assert compiling.warm_up({kinematics!r}, later=compiling.LATER)
 assert compiling.is_compiled({kinematics!r})
 {work}
 print(*found, sep="\\n")

@@ -18,9 +18,9 @@ from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
 from kerfpath.kernels.rays import first_met
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.robots import Robot, robot
-from kerfpath.search import compile_search
+from kerfpath.search import compile_exact, compile_search
 
-__all__ = ["FOR_BOUNDS", "compile_stage", "finish_compiling", "is_compiled", "warm_up"]
+__all__ = ["LATER", "compile_stage", "finish_compiling", "is_compiled", "warm_up"]
 
 EXAMPLES = {"opw": "abb_irb4600_60_205", "ur": "ur_ur10e"}
 """One robot of each kinematic family whose kernels are compiled in advance."""
@@ -39,7 +39,9 @@ def _compile_poses(kinematics: str) -> None:
     for kind in FRAME_KINDS:
         frames = contour.frames(kind)
         graph = build(frames, robot, T_flange_tip=np.eye(4), gamma=gamma_grid(np.pi / 2))
-    robot.inverse(robot.forward(graph.q[:1]))
+    poses = robot.forward(graph.q[:1])
+    robot.inverse(poses)
+    robot.arm.follow(poses, graph.q[:1], np.zeros(1, np.int64))
     increments = np.diff(graph.q, axis=0)
     for distance in (total_distance, maximum_distance):
         distance(increments, graph.q[0], MANHATTAN)
@@ -69,11 +71,12 @@ STAGES: dict[str, Callable[[str], None]] = {
     "poses": _compile_poses,
     "bound": lambda _: compile_bound(),
     "cells": _compile_cells,
+    "exact": lambda _: compile_exact(),
 }
 """The functions that compile the kernels of each stage of the main job; they share almost none."""
 
-FOR_BOUNDS = frozenset({"bound", "cells"})
-"""The stages whose kernels only the certified bound needs."""
+LATER = frozenset({"bound", "cells", "exact"})
+"""Stages whose kernels a plan needs only once it has a motion; what uses them waits for them."""
 
 _running: dict[str, tuple[str, subprocess.Popen[bytes]]] = {}
 """Stages that are being compiled: the kinematic family and the process of each."""
@@ -119,8 +122,8 @@ def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
     kinematics : str
         The kinematic family of the robot, as `Robot.kinematics` names it.
     later : collection of str
-        Stages that may still be compiling when this function returns: `FOR_BOUNDS` or none.
-        `kerfpath.plan` waits for them before the first bound.
+        Stages that may still be compiling when this function returns: `LATER` or none.
+        `kerfpath.plan` waits for them before it uses them.
     """
     missing = [stage for stage in _missing(kinematics) if stage not in _running]
     for stages in ([s for s in missing if s not in later], [s for s in missing if s in later]):

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks._random_contours import cut
+from benchmarks._random_contours import ROBOTS, contour, cut, head
+from benchmarks._random_contours import arm as arm_of
 
 from kerfpath import (
     Band,
     Comfort,
+    GammaWindow,
     NoFeasiblePath,
     Tilt,
     audit,
@@ -22,8 +24,11 @@ from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph, subsampled
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
 from kerfpath.plans import Proof
+from kerfpath.refiner import Refinement
 from kerfpath.setup import Setup
 
 STEP = np.radians(4)
@@ -73,6 +78,59 @@ def test_it_is_no_worse_than_the_refined_grid(task, name):
     if made.settings.closure == "periodic":
         gap = (made.q[-1] - made.q[0]) / (2 * np.pi)
         np.testing.assert_allclose(gap, np.round(gap) * made.robot.endless, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_path_on_the_grid_costs_less(seed, change_effort):
+    """Whatever the task, and whether valleys are explored."""
+    rng = np.random.default_rng(seed)
+    robot = arm_of(str(rng.choice([*ROBOTS])))
+    nodes = contour(rng, robot.reach).resample(count=int(rng.integers(9, 16)))
+    options = {
+        "gamma_step": np.radians(rng.choice([3.0, 6.0, 10.0])),
+        "objective": str(rng.choice(["sum", "max"])),
+        "metric": str(rng.choice(["manhattan", "euclid", "chebychev"])),
+        "closure": "periodic" if nodes.closed and rng.random() < 0.5 else "free",
+    }
+    task = {"tool": head(), "placement": np.eye(4)}
+    fastest = fastest_speed(nodes, robot, gamma_step=options["gamma_step"], **task).speed
+    change_effort(explored=bool(rng.random() < 0.5))
+    options |= task | {"speed": fastest * rng.uniform(0.5, 1.0)}
+    try:
+        grid = plan(nodes, robot, method="exact", **options)
+    except NoFeasiblePath:
+        assert options["closure"] == "periodic"  # the fastest speed need not close
+        return
+    assert plan(nodes, robot, **options).cost <= grid.cost * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_a_motion_dearer_than_the_grid_gives_way_to_it(nodes, arm, tool, placement, closure):
+    """Of a grid the best path that begins at another gamma costs more."""
+    options = PlanOptions(gamma_step=STEP, closure=closure, certify=None)
+    task = planning_task(nodes, Setup.of(arm, tool, placement), options, speed=0.1).whole()
+    where = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    where |= {"method": "exact", "closure": closure}
+    grid = plan(nodes, arm, **where)
+    low, high = grid.gamma[0] + 1.5, grid.gamma[0] + 2.0
+    window = GammaWindow(start=nodes.s[0], end=nodes.s[0], low=low, high=high)
+    poor = plan(nodes, arm, gamma_windows=[window], **where)
+    assert poor.cost > grid.cost
+    starts = Starts(task, CollisionFreeSearch(task))
+    starts.best = Refinement(
+        plan=replace(poor, settings=task.settings),
+        done=True,
+        cost_before=poor.cost,
+        cost_after=poor.cost,
+        programs=0,
+        statement="",
+    )
+    starts.hold_against_grid()
+    assert starts.best.cost_after <= grid.cost
+    assert not [issue for issue in audit(starts.best.plan) if issue.level == "error"]
+    best = starts.best
+    starts.hold_against_grid()  # nothing on the grid costs less now
+    assert starts.best is best
 
 
 def test_the_step_of_gamma_hardly_matters(task):

@@ -139,9 +139,9 @@ def test_an_exploration_ends_where_the_best_motion_is_found_again(
     """It goes on where refinements end elsewhere: to the first changes at random, not further."""
     nodes = circle.resample(count=21)
     options = PlanOptions(gamma_step=np.radians(10))
-    task = planning_task(nodes, Setup.of(arm, tool, placement), options, speed=0.45)
+    task = planning_task(nodes, Setup.of(arm, tool, placement), options, speed=0.15)
     starts, ends = Starts(task, CollisionFreeSearch(task)), []
-    made = plan(nodes, arm, tool=tool, placement=placement, speed=0.45, gamma_step=np.radians(10))
+    made = plan(nodes, arm, tool=tool, placement=placement, speed=0.15, gamma_step=np.radians(10))
     starts.start_from(made, 0.0)
 
     def refined(course, score):
@@ -179,7 +179,8 @@ def test_motions_of_one_posture_do_not_use_up_the_refinements_of_others(
     monkeypatch.setattr(starts, "refine_course", refined)
     Exploration(task, starts).run()
     assert tried.count(tried[0]) == REFINED + REFINED_AGAIN
-    assert {*tried} == {*range(arm.postures)}
+    # Of two that differ in the pose of the wrist alone one is enough.
+    assert {posture // 2 for posture in tried} == {*range(arm.postures // 2)}
 
 
 @pytest.fixture

@@ -241,6 +241,15 @@ def test_closed_samples_are_not_passed(robot, step, branches):
     assert not list(nothing.courses())
 
 
+def test_valleys_without_a_course_are_counted(robot, step, branches):
+    valleys = Valleys(branches, steps_of(robot, step), np.zeros(len(branches.q)))
+    courses = list(valleys.courses())
+    left = [valleys.left(courses[:count]) for count in range(1, len(courses) + 1)]
+    assert (np.diff(left) <= 0).all()
+    assert left[0] > 3
+    assert left[-1] == 0
+
+
 def test_nothing_leads_on_if_the_steps_are_too_small(robot, branches):
     none = steps_of(robot, np.full(6, 1e-9))
     valleys = Valleys(branches, none, np.zeros(len(branches.q)))
@@ -372,6 +381,34 @@ def test_alike_motions_are_kept_once_and_unreachable_ones_dropped(screening, cou
     away[:, 0, 3] += 9.0
     assert screening.screened(courses[:1], ())
     assert not replace(screening, frames=away).screened(courses, SHARP)
+
+
+def in_posture(screening, posture, gamma):
+    K = len(screening.frames)
+    return Course(np.full(K, gamma), np.zeros((K, 6)), np.full(K, posture))
+
+
+def test_of_two_poses_of_a_wrist_one_motion_is_screened(robot, screening):
+    """Both lead to the same; where a range binds one of them, it is the other."""
+    clear = []
+    for gamma in np.radians(range(0, 360, 20)):
+        both = screening._motions([in_posture(screening, mu, gamma) for mu in (0, 1)])
+        clear += [gamma] if len(both.q) == 2 and screening.is_unbound(both.q).all() else []
+    flip = {mu: [in_posture(screening, mu, gamma) for gamma in clear[:2]] for mu in (0, 1)}
+    one, other = (screening._motions(flip[mu]) for mu in (0, 1))
+    assert len(one.q) == 2
+    np.testing.assert_allclose(np.abs(np.diff(one.q, axis=1)), np.abs(np.diff(other.q, axis=1)))
+    assert screening.is_unbound(np.concatenate([one.q, other.q])).all()
+    for first, second in ((0, 1), (1, 0)):
+        both = screening.screened(flip[first] + flip[second], SHARP)
+        alone = screening.screened(flip[first], SHARP)
+        assert [c.posture[0] for c in both] == [first] * len(alone)
+        np.testing.assert_array_equal([c.gamma for c in both], [c.gamma for c in alone])
+    upper, largest = robot.upper.copy(), [each.q[..., 4].max() for each in (one, other)]
+    upper[4] = max(largest) + 0.1
+    held = replace(screening, limits=robot.with_limits(upper=upper).joint_limits())
+    kept = held._without_flipped(held._motions(flip[0] + flip[1]))
+    assert set(kept.posture.ravel()) == {int(np.argmin(largest))}
 
 
 def test_the_score_of_a_motion_within_the_limits_is_its_cost(screening):

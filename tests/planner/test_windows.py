@@ -132,6 +132,15 @@ def test_a_way_closed_by_a_window_is_said_to_be(task, nodes):
     assert caught.value.closed is None
 
 
+@pytest.mark.parametrize("method", ["exact", "continuous"])
+def test_a_window_at_the_start_of_a_closed_motion_holds_at_its_end(task, nodes, method):
+    windows = (over(nodes, 0, 0, 12.3, 33.1),)
+    made = plan(*task[0], **task[1], method=method, closure="periodic", gamma_windows=windows)
+    assert outside(made, windows) <= ROUNDING
+    assert np.abs(np.angle(np.exp(1j * (made.gamma[-1] - made.gamma[0])))) <= ROUNDING
+    assert audit(made) == []
+
+
 def test_nodes_between_nodes_keep_a_window(task, nodes, circle):
     windows = (over(nodes, 10, 25, 20.2, 21.1),)
     made = plan(*task[0], **task[1], gamma_windows=windows)

@@ -57,6 +57,22 @@ def test_the_postures_of_a_ur_are_told_apart_by_geometry():
     np.testing.assert_array_equal(found.posture % 2, np.sin(q5) < 0)
 
 
+@pytest.mark.parametrize("name", ["abb_irb4600_60_205", "kuka_kr16_r1610_2", "ur_ur10e"])
+def test_one_posture_is_solved_as_among_all_of_them(name):
+    """Also of an arm that stands elsewhere; out of reach there are no joints."""
+    rng = np.random.default_rng(22)
+    arm = rebuilt(robot(name), T_base_foot=pose([0.3, -0.2, 0.5])).arm
+    T = arm.forward(rng.uniform(-np.pi, np.pi, (300, 6))).copy()
+    T[::3, :3, 3] *= rng.uniform(0.2, 2.0, (100, 1))
+    q, reach = arm.inverse_all(T)
+    assert 0 < reach.mean() < 1
+    for mu in range(arm.postures):
+        found = arm.follow(T, np.zeros((len(T), 6)), np.full(len(T), mu))
+        np.testing.assert_array_equal(np.isfinite(found).all(axis=1), reach[:, mu])
+        # Nearest to zero is within half a turn; the arithmetic is the same.
+        np.testing.assert_allclose(turned(found - q[:, mu])[reach[:, mu]], 0, atol=1e-12)
+
+
 @pytest.mark.parametrize("q5", [0.0, np.pi, 1e-13, 1e-9, 1e-6])
 def test_a_ur_with_axes_four_and_six_in_line_is_solved(q5):
     q = np.random.default_rng(22).uniform(-np.pi, np.pi, (3000, 6))

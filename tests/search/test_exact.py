@@ -10,6 +10,8 @@ from hypothesis.extra import numpy as hnp
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
+from kerfpath.limits import Limits
+from kerfpath.search import NoCheaperPath, SearchProblem, find_cheaper, find_shortest
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0]}
 
@@ -73,6 +75,38 @@ def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
     rng = np.random.default_rng(21)
     feasible = sum(agree(rng, closure) for _ in range(500))
     assert 100 < feasible < 480
+
+
+@pytest.mark.parametrize("rotation", [None, 0.5])
+@pytest.mark.parametrize("closure", ["free", "periodic"])
+def test_a_cheaper_path_is_the_best_one_if_that_costs_less(closure, rotation):
+    """Also if all paths without closure and rotation limits cost less; else none is found."""
+    rng, seen = np.random.default_rng(22), {"found": 0, "none": 0, "no path": 0}
+    for _ in range(150):
+        q, start, o = instance(rng, closure)
+        limits = Limits.of(*(o.pop(name) for name in ("velocity", "acceleration")),
+                           eta_v=o.pop("eta_v"), eta_a=o.pop("eta_a"))  # fmt: skip
+        most = None if rotation is None else np.where(o["endless"], rotation, np.inf)
+        problem = SearchProblem(
+            q=q, start=start, limits=limits, closure=closure, rotation=most, **o
+        )
+        try:
+            best = find_shortest(problem)
+        except NoFeasiblePath:
+            seen["no path"] += 1
+            with pytest.raises(NoCheaperPath):
+                find_cheaper(problem, np.inf)
+            continue
+        for share in (0.5, 1.0, 1 + 1e-9, 2.0):
+            most_cost = share * best.cost
+            if best.cost < most_cost:
+                seen["found"] += 1
+                assert find_cheaper(problem, most_cost).cost == best.cost
+            else:
+                seen["none"] += 1
+                with pytest.raises(NoCheaperPath):
+                    find_cheaper(problem, most_cost)
+    assert min(seen.values()) > 10
 
 
 @pytest.mark.parametrize("below", [0.3, 20.0])

@@ -310,10 +310,10 @@ def compile_kernels(kinematics: str | None = None) -> None:
         need are then compiled while it plans. Default: all for the usual family, for processes to
         come.
     """
-    from kerfpath.compiling import FOR_BOUNDS
+    from kerfpath.compiling import LATER
     from kerfpath.job import is_compiled, warm_up
 
-    later = () if kinematics is None else FOR_BOUNDS
+    later = () if kinematics is None else LATER
     kinematics = kinematics or "opw"
 
     if is_compiled(kinematics):

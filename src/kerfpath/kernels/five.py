@@ -28,7 +28,7 @@ import numpy as np
 from kerfpath.arrays import Array, Bools
 from kerfpath.kernels.frames import location
 from kerfpath.kernels.jit import jit, jit_part
-from kerfpath.kernels.kinematics import ON_AXIS, POSTURES, OpwArm, forward, inverse, wrap
+from kerfpath.kernels.kinematics import EVERY, ON_AXIS, POSTURES, OpwArm, forward, inverse, wrap
 
 __all__ = ["forward_all", "inverse_all", "inverse_nodes"]
 
@@ -54,7 +54,7 @@ def _turned(
                 L[r, 0] * T_tip_end[0, c] + L[r, 1] * T_tip_end[1, c] + L[r, 2] * T_tip_end[2, c]
             )
         T[r, 3] += L[r, 3]
-    inverse(arm, T, q, reach)
+    inverse(arm, T, EVERY, q, reach)
 
 
 @jit_part

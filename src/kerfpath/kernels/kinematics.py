@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools
+from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.kernels.frames import location
 from kerfpath.kernels.jit import jit, jit_part
 
@@ -29,10 +29,13 @@ __all__ = [
     "inverse",
     "inverse_all",
     "inverse_nodes",
+    "inverse_one",
     "wrap",
 ]
 
 POSTURES = 8
+EVERY = -1
+"""In place of a posture: all of them."""
 
 REACH = 1e-12
 """Excess of a cosine over 1 that rounding may leave at the stretched arm; it is clipped."""
@@ -122,10 +125,10 @@ def _wrist(
 
 
 @jit_part
-def inverse(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
-    """All postures of a flange pose, Q = f^-1(L, mu) in (-pi, pi] (Eq. 4).
+def inverse(arm: OpwArm, T: Array, posture: int, out_q: Array, out_reach: Bools) -> None:
+    """All postures of a flange pose, Q = f^-1(L, mu) in (-pi, pi] (Eq. 4), or one with its flip.
 
-    Fills out_q (8, 6) and out_reach (8,); rows out of reach are left at zero.
+    Fills out_q (8, 6) and out_reach (8,); rows out of reach, or not asked for, are left at zero.
     """
     cx = T[0, 3] - arm.c4 * T[0, 2]
     cy = T[1, 3] - arm.c4 * T[1, 2]
@@ -141,6 +144,8 @@ def inverse(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     d = sqrt(max(dd, 0.0))
     psi = atan2(arm.a2, arm.c3)
     for shoulder in range(2):
+        if posture != EVERY and shoulder != posture // 4:
+            continue
         front = 1.0 if shoulder == 0 else -1.0
         k1, s1 = front, 0.0
         if rr > ON_AXIS * ON_AXIS:
@@ -157,6 +162,8 @@ def inverse(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
         q1 = wrap(arm.sign[0] * (atan2(s1, k1) + arm.offset[0]))
         A = arm.c2 + k * cosine
         for elbow in range(2):
+            if posture != EVERY and elbow != posture // 2 % 2:
+                continue
             up = front if elbow == 0 else -front
             B = up * k * sine
             s2, k2 = (x * A - z * B) / reach, (z * A + x * B) / reach
@@ -185,7 +192,17 @@ def inverse_all(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
         for r in range(4):
             for c in range(4):
                 pose[r, c] = T[i, r, c]
-        inverse(arm, pose, out_q[i], out_reach[i])
+        inverse(arm, pose, EVERY, out_q[i], out_reach[i])
+
+
+@jit
+def inverse_one(arm: OpwArm, T: Array, posture: Ints, out_q: Array) -> None:
+    """Joints (B, 6) of flange poses (B, 4, 4) in one posture (B,) each; NaN out of reach."""
+    q, reach = np.empty((POSTURES, 6)), np.empty(POSTURES, np.bool_)
+    for i in range(len(T)):
+        inverse(arm, T[i], posture[i], q, reach)
+        for j in range(6):
+            out_q[i, j] = q[posture[i], j] if reach[posture[i]] else np.nan
 
 
 @jit
@@ -207,4 +224,4 @@ def inverse_nodes(
                         + L[r, 2] * T_tip_flange[2, c]
                     )
                 T[r, 3] += L[r, 3]
-            inverse(arm, T, out_q[k, j], out_reach[k, j])
+            inverse(arm, T, EVERY, out_q[k, j], out_reach[k, j])

@@ -20,11 +20,13 @@ from __future__ import annotations
 from math import atan2, copysign, cos, sin, sqrt
 from typing import NamedTuple
 
-from kerfpath.arrays import Array, Bools
-from kerfpath.kernels.jit import jit, jit_part
-from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
+import numpy as np
 
-__all__ = ["UrArm", "forward", "forward_all", "inverse", "inverse_all"]
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_part
+from kerfpath.kernels.kinematics import EVERY, ON_AXIS, POSTURES, REACH, wrap
+
+__all__ = ["UrArm", "forward", "forward_all", "inverse", "inverse_all", "inverse_one"]
 
 
 class UrArm(NamedTuple):
@@ -118,10 +120,10 @@ def _elbow(
 
 
 @jit_part
-def inverse(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
-    """All postures of a flange pose, in (-pi, pi].
+def inverse(arm: UrArm, T: Array, posture: int, out_q: Array, out_reach: Bools) -> None:
+    """All postures of a flange pose, in (-pi, pi], or one with the other elbow.
 
-    Fills out_q (8, 6) and out_reach (8,); rows out of reach are left at zero.
+    Fills out_q (8, 6) and out_reach (8,); rows out of reach, or not asked for, are left at zero.
     """
     px, py = T[0, 3] - arm.d6 * T[0, 2], T[1, 3] - arm.d6 * T[1, 2]
     height = T[2, 3] - arm.d6 * T[2, 2] - arm.d1
@@ -133,6 +135,8 @@ def inverse(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
         return
     d = sqrt(max(dd, 0.0))
     for shoulder in range(2):
+        if posture != EVERY and shoulder != posture // 4:
+            continue
         front = 1.0 if shoulder == 0 else -1.0
         radial = front * copysign(d, arm.a2)
         k1, s1 = 1.0, 0.0
@@ -143,6 +147,8 @@ def inverse(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
         s5 = sqrt(x * x + y * y)
         q5 = atan2(s5, T[0, 2] * s1 - T[1, 2] * k1)
         for wrist in range(2):
+            if posture != EVERY and wrist != posture % 2:
+                continue
             plus = 1.0 if wrist == 0 else -1.0
             if s5 > ON_AXIS:
                 st, kt = -plus * y / s5, -plus * x / s5
@@ -180,4 +186,14 @@ def forward_all(arm: UrArm, q: Array, out_T: Array) -> None:
 def inverse_all(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (B, 8, 6) of flange poses (B, 4, 4)."""
     for i in range(len(T)):
-        inverse(arm, T[i], out_q[i], out_reach[i])
+        inverse(arm, T[i], EVERY, out_q[i], out_reach[i])
+
+
+@jit
+def inverse_one(arm: UrArm, T: Array, posture: Ints, out_q: Array) -> None:
+    """Joints (B, 6) of flange poses (B, 4, 4) in one posture (B,) each; NaN out of reach."""
+    q, reach = np.empty((POSTURES, 6)), np.empty(POSTURES, np.bool_)
+    for i in range(len(T)):
+        inverse(arm, T[i], posture[i], q, reach)
+        for j in range(6):
+            out_q[i, j] = q[posture[i], j] if reach[posture[i]] else np.nan

@@ -59,16 +59,25 @@ def plan_continuous(task: Task, finder: CollisionFreeSearch, begin: Callable[[st
 
 
 def best_motion_found(attempt: Attempt) -> Plan | None:
-    """Plan the best motion found from paths between the samples of gamma."""
+    """Plan the best motion found from paths between the samples of gamma.
+
+    It costs no more than any path on the grid, unless it was found along some of very many nodes,
+    without the graph of all.
+    """
     if grid_reason(attempt.task):
         return None
     attempt.begin("search")
-    attempt.starts = Starts(attempt.task, attempt.finder)
-    found = _clear_motion(attempt.task, attempt.starts, attempt.begin)
-    if found is None:
+    attempt.starts = starts = Starts(attempt.task, attempt.finder)
+    if _clear_motion(attempt.task, starts, attempt.begin) is None:
         return None
-    made = claimed(found, attempt.finder, attempt.starts.told)
-    if attempt.starts.stopped:
+    if attempt.task.is_built and not starts.stopped:
+        try:
+            starts.hold_against_grid()
+        except StopEarly:
+            starts.stopped = True
+    assert starts.best is not None, "a motion was found"
+    made = claimed(starts.best, attempt.finder, starts.told)
+    if starts.stopped:
         made = replace(made, proof=made.proof.also(STOPPED))
     return made
 

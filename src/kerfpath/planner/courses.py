@@ -110,7 +110,7 @@ class Courses:
         self.followed: list[Course] = []
         """Courses through valleys among those of `all`, each once."""
         self.unfollowed = 0
-        """Number of further courses through valleys, beyond `COURSES` along the same nodes."""
+        """Number of further valleys, beyond `COURSES` courses along the same nodes."""
 
     @property
     def value_along_few(self) -> float:
@@ -174,12 +174,13 @@ class Courses:
         courses = self._constant()
         self.followed, self.unfollowed = [], 0
         for through, nodes in valleys:
-            each = self._through(through, nodes)
-            for course in islice(each, COURSES):
+            own = list(islice(through.courses(), COURSES))
+            for each in own:
+                course = self._along_all_nodes(each, nodes)
                 if not any(course.like(other) for other in self.followed):
                     self.followed.append(course)
                 courses += varied(course)
-            self.unfollowed += sum(1 for _ in each)
+            self.unfollowed += through.left(own) if len(own) == COURSES else 0
         return courses
 
     def cheapest(self) -> Iterator[Course]:
@@ -189,17 +190,18 @@ class Courses:
         yielded.
         """
         known = list[tuple[float, Course]]()
-        for course in self._through(*self._along_few[0]):
+        valleys, nodes = self._along_few[0]
+        for each in valleys.courses():
+            course = self._along_all_nodes(each, nodes)
             score = float(self._screening.scores(course.q[None])[0])
             alike = (c for s, c in known if abs(s - score) <= EQUAL_SCORES * score)
             if not any(course._replace(posture=c.posture).like(c) for c in alike):
                 known.append((score, course))
                 yield course
 
-    def _through(self, valleys: Valleys, nodes: Ints) -> Iterator[Course]:
-        """Yield courses through valleys along some nodes as ones along all nodes."""
-        for each in valleys.courses():
-            yield self.closed(_spread(each, nodes, len(self._frames)))
+    def _along_all_nodes(self, course: Course, nodes: Ints) -> Course:
+        """Return a course along some nodes as one along all nodes, closed if it must be."""
+        return self.closed(_spread(course, nodes, len(self._frames)))
 
     def _constant(self) -> list[Course]:
         """Return courses with a constant gamma; they need not be in reach."""
@@ -213,6 +215,16 @@ class Courses:
     def closed(self, course: Course) -> Course:
         """Return a course, shifted along the path if it must end where it begins."""
         return course._replace(gamma=self._task.closed(course.gamma))
+
+    def same(self, one: Course, other: Course, within: float) -> bool:
+        """Return whether gamma of two motions differs by less than `within` rad, in one posture.
+
+        Or in two that differ in the pose of the wrist alone, where no range of it binds either.
+        """
+        if one.like(other, within):
+            return True
+        flipped, both = one._replace(posture=one.posture ^ 1), np.stack([one.q, other.q])
+        return flipped.like(other, within) and bool(self._screening.is_unbound(both).all())
 
     def screened(
         self, courses: list[Course], *ways: tuple[Stage, ...]

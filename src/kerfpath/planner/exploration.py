@@ -32,7 +32,7 @@ HOPELESS = 1.25
 """Scores from this many times the best cost on are not refined: a refinement gains less."""
 ROUNDS = 2
 """Times that the best motions are shaken, the second only if the first gained."""
-AGAIN, SAME_END = 4, 1e-4
+AGAIN, SAME_END = 3, 1e-4
 """Refinements that end at the best cost again, to this relative difference, from which on no more
 are made: motions that are not alike lead to it."""
 SHAKEN = 2
@@ -137,10 +137,14 @@ class Exploration:
         return np.inf if best is None else best.cost_after
 
     def _is_known(self, course: Course) -> bool:
-        """Return whether a motion is nearly one that has been refined, or one found so."""
+        """Return whether a motion is nearly one that has been refined, or one found so.
+
+        The other pose of its wrist changes nothing, unless it must be clear in a cell.
+        """
         plans = (each.plan for each in self._starts.all_found)
         found = (Course(plan.gamma, plan.q, plan.posture) for plan in plans)
-        return any(course.like(other, SAME_MOTION) for other in (*self._known, *found))
+        same = self._courses.same if self._starts.finder.is_free else Course.like
+        return any(same(course, other, SAME_MOTION) for other in (*self._known, *found))
 
     def _best(self) -> list[Plan]:
         """Return the best motions that differ in cost."""

@@ -98,7 +98,9 @@ def layered_graph(
     )
     if nodes is not None:
         asked = replace(asked, retract=None)  # its first and last layer need not be the ends
-    return within_margins(replace(graph, folded=fold), robot, asked, T_flange_tip, s)
+    periodic = asked.closure == "periodic" and nodes is None
+    graph = replace(graph, folded=fold)
+    return within_margins(graph, robot, asked, T_flange_tip, s, periodic=periodic)
 
 
 def course_of(external: ArrayLike, contour: Contour, robot: Robot) -> Array:

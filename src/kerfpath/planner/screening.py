@@ -69,6 +69,11 @@ ALIKE, SAME_SCORE = 0.03, 0.02
 OVER, OUTSIDE, NEGLIGIBLE = 0.2, 10.0, 0.01
 """Scores are costs times 1 + OVER per limit exceeded by once the limit, and OUTSIDE per rad out of
 a range, if it is more than NEGLIGIBLE rad."""
+SAME_STEPS = 1e-6
+"""rad, and relative difference of the ways of all joints: motions that differ by less have the same
+steps."""
+UNBOUND = 0.5
+"""rad: where the joints of a wrist stay so far inside their ranges, these do not shape a motion."""
 Aim = Literal["cost", "interval", "time"]
 """What motions are compared by: their cost, the least interval that all their steps can have, or
 the time that they take where every step has its own interval, at least the one asked for."""
@@ -128,7 +133,7 @@ class Screening:
         """Return the best motions that courses lead to, by their score; there may be none."""
         if not courses:
             return []
-        motions = self._motions(courses)
+        motions = self._without_flipped(self._motions(courses))
         for stage in stages:
             if not len(motions.gamma):
                 break
@@ -152,6 +157,37 @@ class Screening:
         return replace(
             motions, q=np.stack([within(self.limits, each) for each in q]) if len(q) else q
         )
+
+    def _without_flipped(self, motions: Motions) -> Motions:
+        """Leave out one of two motions that differ in the pose of the wrist alone (`Arm.flip`).
+
+        Their steps are alike, so that they cost the same and lead to the same, unless a range of
+        the other binds.
+        """
+        way = np.abs(np.diff(motions.q, axis=1)).sum(axis=(1, 2))
+        order, unbound = np.argsort(way, kind="stable"), self.is_unbound(motions.q)
+        kept = np.ones(len(way), np.bool_)
+        for place, i in enumerate(order):
+            for j in order[place + 1 :]:
+                if way[j] > (1 + SAME_STEPS) * way[i]:
+                    break
+                flipped = np.array_equal(motions.posture[i], motions.posture[j] ^ 1)
+                apart = np.abs(wrap(motions.gamma[i] - motions.gamma[j])).max()
+                if flipped and apart < SAME_STEPS and unbound[[i, j]].any():
+                    kept[j if unbound[i] and (i < j or not unbound[j]) else i] = False
+        return motions.of(kept)
+
+    def is_unbound(self, q: Array) -> Bools:
+        """Return of which motions q (S, K, n) rad the wrist may be flipped, (S,).
+
+        It has another pose (`Arm.flip`), and no joint of it is near the end of its range.
+        """
+        flip = self.robot.arm.flip
+        if flip is None:
+            return np.zeros(len(q), np.bool_)
+        wrist = slice(flip[0] - 1, None)
+        inside = np.minimum(q - self.limits.lower, self.limits.upper - q)[..., wrist]
+        return np.asarray(((inside > UNBOUND) | self.limits.endless[wrist]).all(axis=(1, 2)))
 
     def _joints(self, gamma: Array, near: Array, posture: Ints) -> Array:
         """Return the joints (S, K, n) at gamma (S, K) on the turns near `near`, or NaN."""

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from kerfpath import refiner
 from kerfpath.arrays import Array
+from kerfpath.compiling import finish_compiling
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import alike
 from kerfpath.planner.refinements import plan_off_grid
+from kerfpath.planner.straight_moves import not_followed
 from kerfpath.planner.task import Task
 from kerfpath.plans import Explored, Plan, Proof, has_room
 from kerfpath.refiner import Goal, Refinement
-from kerfpath.search import ContinuousPath, Course, find_shortest
+from kerfpath.search import (
+    ContinuousPath,
+    Course,
+    NoCheaperPath,
+    find_cheaper,
+    find_shortest,
+)
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma when a path between the samples is refined."""
@@ -201,6 +210,28 @@ class Starts:
         if found is not None and found.done and self.finder.is_clear(found.plan):
             own = replace(found.plan, settings=self._task.settings)
             self.best = _better(self.best, replace(found, plan=own))
+
+    def hold_against_grid(self) -> None:
+        """Take the best path on the grid of the task, refined if possible, where it costs less.
+
+        That there is none is proved with little work: paths that cost more are not followed.
+        """
+        assert self.best is not None, "there is a motion to compare with"
+        finish_compiling({"exact"})
+        try:
+            cheaper = partial(find_cheaper, cost=self.best.cost_after)
+            path = self.finder.find(cheaper, self._task.problem)
+        except NoCheaperPath:
+            return
+        made = self._task.plan(path.index, path.cost, _CLAIM)
+        self.tally.refined += 1
+        refined = refiner.refine(made)
+        found = [refined] if refined.done else []
+        if made.robot.jerk_limit() is None:  # else the path need not keep it
+            found.append(replace(refined, done=True, plan=made, cost_after=made.cost))
+        for each in found:
+            if self.finder.is_clear(each.plan) and not_followed(each.plan) is None:
+                self.best = _better(self.best, each)
 
 
 def _refine_path(

@@ -114,6 +114,11 @@ class Task:
         return self.layers(self, None)
 
     @property
+    def is_built(self) -> bool:
+        """Whether the layers of all nodes are built."""
+        return "built" in vars(self)
+
+    @property
     def graph(self) -> LayeredGraph:
         """The layered graph of all nodes."""
         return self.built.graph
@@ -159,7 +164,7 @@ class Task:
 
     def at_nodes(self, nodes: Ints) -> Layered:
         """Return the layers of some nodes (M,), ascending, without building those of all nodes."""
-        return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(self, nodes)
+        return self.built.at_nodes(nodes) if self.is_built else self.layers(self, nodes)
 
     @property
     def times(self) -> Array:

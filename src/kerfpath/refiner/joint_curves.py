@@ -60,12 +60,12 @@ class JointCurves:
         return np.concatenate([arm, x], axis=1)
 
     def _of_arm(self, H: Array, gamma: Array, near: Array) -> Array:
-        K = len(gamma)
-        spin = np.tile(np.eye(4), (K, 1, 1))
-        spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
-        spin[:, 1, 0] = np.sin(gamma)
-        spin[:, 0, 1] = -spin[:, 1, 0]
-        return self._robot.arm.follow(H @ spin @ self._T_tip_flange, near, self._posture)
+        c, s = np.cos(gamma)[:, None], np.sin(gamma)[:, None]
+        turned = np.array(H)
+        turned[:, :, 0] = H[:, :, 0] * c + H[:, :, 1] * s
+        turned[:, :, 1] = H[:, :, 1] * c - H[:, :, 0] * s
+        T = (turned.reshape(-1, 4) @ self._T_tip_flange).reshape(-1, 4, 4)
+        return self._robot.arm.follow(T, near, self._posture)
 
     def slope(self, free: Array, q: Array) -> Array:
         """Return dq/dfree (K, n, F) at joints `q` (K, n); NaN at the edge of reach."""

@@ -240,14 +240,19 @@ class Arm:
         Each joint is on the turn nearest to q (B, n), whose postures (B,) are given; rows are NaN
         where the branch does not reach the pose. A `given` joint keeps its value.
         """
-        if self.family.follow_all is None:
+        if self.family.follow_all is not None:
+            found = np.array(q)
+            self.family.follow_all(self.model(), self._model_poses(T), found)
+            return found
+        if self.family.inverse_one is not None:
+            found = np.empty(q.shape)
+            one = np.array(posture, dtype=np.int64)
+            self.family.inverse_one(self.model(), self._model_poses(T), one, found)
+        else:
             solved, reach = self.inverse_all(T, self.given_of(q))
             b = np.arange(len(q))
             found = np.where(reach[b, posture, None], solved[b, posture], np.nan)
-            return np.asarray(found + 2 * np.pi * np.round((q - found) / (2 * np.pi)))
-        found = np.array(q)
-        self.family.follow_all(self.model(), self._model_poses(T), found)
-        return found
+        return np.asarray(found + 2 * np.pi * np.round((q - found) / (2 * np.pi)))
 
     def nearest(self, T: Array, q: Array) -> Array:
         """Return the joints (B, n) rad nearest to q (B, n) that bring the flange to T (B, 4, 4).

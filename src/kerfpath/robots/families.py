@@ -50,6 +50,9 @@ class Family:
         its angles (B,) are the third argument of the inverse.
     inverse_nodes : callable, optional
         As `kernels.kinematics.inverse_nodes`, where the family has such a kernel.
+    inverse_one : callable, optional
+        (model, T (B, 4, 4), posture (B,), out_q (B, n)): the joints of each pose in one posture, or
+        NaN, where that takes less time than all postures.
     follow_all : callable, optional
         (model, T (B, 4, 4), q (B, n)): brings each q onto its pose along its own branch, or makes
         it NaN; for a family where several branches share a posture.
@@ -79,6 +82,7 @@ class Family:
     forward_all: Callable[..., None]
     inverse_all: Callable[..., None]
     inverse_nodes: Callable[..., None] | None = None
+    inverse_one: Callable[..., None] | None = None
     follow_all: Callable[..., None] | None = None
     enclose_all: Callable[..., None] | None = None
     wrist: str = ""
@@ -108,6 +112,7 @@ FAMILIES = {
             forward_all=kinematics.forward_all,
             inverse_all=kinematics.inverse_all,
             inverse_nodes=kinematics.inverse_nodes,
+            inverse_one=kinematics.inverse_one,
             enclose_all=enclosure.enclose_all,
             wrist="c4",
             flips=4,
@@ -121,6 +126,7 @@ FAMILIES = {
             model=ur.UrArm,
             forward_all=ur.forward_all,
             inverse_all=ur.inverse_all,
+            inverse_one=ur.inverse_one,
             enclose_all=enclosure_ur.enclose_all,
             wrist="d6",
         ),

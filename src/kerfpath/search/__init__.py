@@ -24,6 +24,9 @@ from kerfpath.search.problem import rotation_limits as rotation_limits
 from kerfpath.search.relaxations import Relaxations as Relaxations
 from kerfpath.search.relaxations import find_relaxations as find_relaxations
 from kerfpath.search.shortest import LayeredPath as LayeredPath
+from kerfpath.search.shortest import NoCheaperPath as NoCheaperPath
+from kerfpath.search.shortest import compile_exact as compile_exact
+from kerfpath.search.shortest import find_cheaper as find_cheaper
 from kerfpath.search.shortest import find_shortest as find_shortest
 from kerfpath.search.shortest import shortest_path as shortest_path
 from kerfpath.search.slow_path import edges_allowed as edges_allowed

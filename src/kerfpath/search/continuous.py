@@ -8,16 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import continuous as kernel
 from kerfpath.kernels.beam import Alike, Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import increments_between
-from kerfpath.limits import Limits
 from kerfpath.progress import may_stop
-from kerfpath.search.problem import SearchProblem, unroll
+from kerfpath.search.problem import SearchProblem, example_problem, unroll
 
 WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
 """rad, steps of gamma, and rad: neighbouring samples are joined if no joint moves further between
@@ -350,18 +349,9 @@ def targets_of(
 
 def compile_search() -> None:
     """Compile the kernels of `ContinuousSearch` by a search of three nodes with 4 samples each."""
-    nodes, samples, joints = 3, 4, 6
-    sample = np.tile(np.arange(samples), nodes)
-    q = np.zeros((nodes * samples, joints))
-    q[:, -1] = sample
-    ones = np.ones(joints)
-    problem = SearchProblem(
-        q=freeze(q),
-        start=freeze(np.arange(0, len(q) + 1, samples)),
-        dt=1.0,
-        limits=Limits.of(ones, ones),
-        endless=ones > 0,
-    )
+    problem = example_problem()
+    samples = int(problem.start[1])
+    sample = np.tile(np.arange(samples), len(problem.start) - 1)
     on_grid = GammaSamples(
         sample=sample,
         variant=np.zeros_like(sample),

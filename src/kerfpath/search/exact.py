@@ -89,6 +89,13 @@ def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | 
     return BestPath(path=found[0], cost=found[1], total=found[1])
 
 
+def may_cost_less(layers: SortedLayers, aim: Aim, ceiling: float) -> bool:
+    """Return whether a path that need not close costs less than `ceiling`."""
+    every = np.ones(len(layers.low), np.bool_)
+    found = _grow(layers, aim, every, NO_SEAM, ceiling=ceiling)
+    return found is not None and found[1] < ceiling
+
+
 def best_allowed(
     layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float = -np.inf
 ) -> BestPath | None:

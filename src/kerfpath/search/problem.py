@@ -77,7 +77,7 @@ def sort_layers(
     kept, circular = None, False
     if cost.max(initial=0.0) == np.inf:
         kept = np.flatnonzero(cost < np.inf)
-        q, start = q[kept], np.searchsorted(kept, start)
+        q, start = freeze(q[kept]), np.searchsorted(kept, start)
         key = None if key is None else key[kept]
     if key is None:
         key, width, circular = _narrowest_key(q, start, velocity, endless)
@@ -206,9 +206,8 @@ def _narrowest_key(
     pairs = np.zeros(q.shape[1], np.int64)
     for k in layers[layers + 2 < len(start)]:
         here, there = q[start[k] : start[k + 1]], q[start[k + 1] : start[k + 2]]
-        kernel.count_within(
-            here[:: len(here) // _VERTICES_SAMPLED + 1], there, bound, endless, pairs
-        )
+        some = freeze(here[:: len(here) // _VERTICES_SAMPLED + 1].copy())
+        kernel.count_within(some, there, bound, endless, pairs)
     best = int(np.argmin(pairs))
     key = np.empty(len(q))
     kernel.fill_key(q, best, bool(endless[best]), key)
@@ -576,6 +575,21 @@ class SearchProblem:
             else TorqueTest(arm=torque.dynamics.bodies, bound=torque.bound, dt=self.dt),
             reversals=self.reversals,
         )
+
+
+def example_problem() -> SearchProblem:
+    """Return a problem of three nodes with four vertices each, to compile kernels with."""
+    nodes, samples, joints = 3, 4, 6
+    q = np.zeros((nodes * samples, joints))
+    q[:, -1] = np.tile(np.arange(samples), nodes)
+    ones = np.ones(joints)
+    return SearchProblem(
+        q=freeze(q),
+        start=freeze(np.arange(0, len(q) + 1, samples)),
+        dt=1.0,
+        limits=Limits.of(ones, ones),
+        endless=ones > 0,
+    )
 
 
 def change_table(limits: Limits) -> ChangeTable:

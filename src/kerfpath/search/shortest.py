@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import States
 from kerfpath.limits import Limits, TorqueLimit
 from kerfpath.search.branch import best_closed_path
-from kerfpath.search.exact import BestPath, best_path, dead_end
+from kerfpath.search.exact import BestPath, best_path, dead_end, may_cost_less
 from kerfpath.search.problem import (
     Closure,
     Layers,
@@ -28,6 +29,7 @@ from kerfpath.search.problem import (
     broken_edge,
     closed_before,
     empty_layer,
+    example_problem,
     reverse,
     sort_layers,
     too_far,
@@ -191,6 +193,36 @@ def find_shortest(problem: SearchProblem) -> LayeredPath:
         raise
     over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
     return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
+
+
+class NoCheaperPath(Exception):  # an answer, not an error
+    """No path costs less than asked. In a cell nobody asks why, as of `NoFeasiblePath`."""
+
+
+def find_cheaper(problem: SearchProblem, cost: float) -> LayeredPath:
+    """Return the best path through the layers of a problem, method "exact", below a cost.
+
+    Where none is, this takes less time than `find_shortest`: what costs more is not followed, and
+    closure and rotation limits matter only if there is one without them.
+
+    Raises
+    ------
+    NoCheaperPath
+        No path costs less, which is proved.
+    """
+    layers = sort_layers(problem.layers, problem.aim.velocity)
+    whole = _filled(layers) == len(layers.start) - 1
+    if whole and may_cost_less(layers, problem.aim, cost):
+        with suppress(NoFeasiblePath):
+            found = find_shortest(problem)
+            if found.cost < cost:
+                return found
+    raise NoCheaperPath
+
+
+def compile_exact() -> None:
+    """Compile the kernels of `find_cheaper`."""
+    find_cheaper(example_problem(), np.inf)
 
 
 def _filled(layers: SortedLayers) -> int:

@@ -7,6 +7,7 @@ Where (6) binds, the best motion may lie in any of them.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -138,6 +139,16 @@ class Valleys:
             if not any(course.like(other) for other in known):
                 known.append(course)
                 yield course
+
+    def left(self, followed: list[Course]) -> int:
+        """Return how many valleys none of the courses is in, at the node where they are most."""
+        gamma, posture = (np.array([course[part] for course in followed]) for part in (0, 2))
+        count, branches = Counter[int](), self._branches
+        for node, v in self._bottoms():
+            apart = np.abs(wrap(gamma[:, node] - branches.gamma[v]))
+            passed = (posture[:, node] == branches.posture[v]) & (apart < SAME_COURSE)
+            count[node] += not passed.any()
+        return max(count.values(), default=0)
 
     def _bottoms(self) -> Iterator[tuple[int, int]]:
         """Yield node and sample of each valley, by the cost of the best course through it."""

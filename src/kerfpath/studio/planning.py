@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from kerfpath.cad import Part
-from kerfpath.compiling import FOR_BOUNDS
+from kerfpath.compiling import LATER
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, KerfpathError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
@@ -552,7 +552,7 @@ class Planning:
         kinematics = prepared.job.robot.kinematics
         if not is_compiled(kinematics):
             self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
-            warm_up(kinematics, later=FOR_BOUNDS)
+            warm_up(kinematics, later=LATER)
         run = Run(self._cache, prepared, revision, self._say, stop)
         tried = run.contours(first, partial(self._took, motion_key(job), revision))
         self._look_ahead(prepared, revision, run)
