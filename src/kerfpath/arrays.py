@@ -230,6 +230,11 @@ SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
 """For the unit of a joint: the factor to the unit that people and files see, and that unit."""
 
 
+def lengths_along(points: Array) -> Array:
+    """Return the length (K,) of a polyline up to each of its points (K, d)."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
 def spread(count: int, most: int) -> Ints:
     """Return at most so many of the numbers from 0 to count - 1, evenly spread, both ends."""
     return np.unique(np.linspace(0, count - 1, most).astype(np.int64))

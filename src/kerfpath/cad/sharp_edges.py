@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.arrays import Array, Ints, lengths_along, short_repr
 from kerfpath.contour import angle_between, unit
 from kerfpath.errors import InputError
 
@@ -147,7 +147,7 @@ def turn_at_edges(line: Sampled, reach: float, *, is_closed: bool) -> tuple[Arra
         nodes = (found[0] + np.arange(count + 1)) % count
         cuts = np.append(found - found[0], count)
     points, arriving, leaving = (each[nodes] for each in line)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    s = lengths_along(points)
     about = half_turns(arriving, leaving) * np.isin(nodes, found)[:, None]
     walls = Walls(
         start=s[cuts[:-1]], end=s[cuts[1:]], first=-about[cuts[:-1]], last=about[cuts[1:]],

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, short_repr
+from kerfpath.arrays import Array, Bools, lengths_along, short_repr
 from kerfpath.auditor import ENCLOSED, rates_along
 from kerfpath.comfort import jacobian
 from kerfpath.errors import InputError
@@ -482,7 +482,7 @@ def timing_of(
     limits = (eta_v * velocity, eta_a * acceleration)
     rate = fastest_rates(run.time, first, second, limits, speed_share)
     clock = clock_of(run.time, rate)
-    gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.T[:, :3, 3], axis=0), axis=1)))
+    gone = lengths_along(run.T[:, :3, 3])
     return Timing(
         seconds=float(clock[-1]),
         programmed=float(run.tool_motion.time[-1]),

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, Bools, short_repr, spread
+from kerfpath.arrays import Array, Bools, lengths_along, short_repr, spread
 from kerfpath.errors import InputError, about
 from kerfpath.execution.executed import Executed, timing_of
 from kerfpath.execution.path_error import STEP, Polyline, commanded
@@ -170,7 +170,7 @@ class Stretch:
     @property
     def s(self) -> Array:
         """Length of the way, m, up to each point, (k,)."""
-        return _length(self.points)
+        return lengths_along(self.points)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,7 +217,7 @@ def stretches(log: Log, runs: Sequence[CommandedRun]) -> list[Stretch]:
     for number, run in enumerate(runs):
         path = run.tips(Response())
         start, along, off = Polyline.of(path).nearest(log.tip)
-        length = _length(path)
+        length = lengths_along(path)
         s = length[start] + along * (length[start + 1] - length[start])
         found += [
             (float(off[part].mean()), number, part)
@@ -231,16 +231,11 @@ def stretches(log: Log, runs: Sequence[CommandedRun]) -> list[Stretch]:
             continue
         taken[part] = True
         points = log.tip[part]
-        way = _length(points)
+        way = lengths_along(points)
         some = np.unique(np.searchsorted(way, np.linspace(0, way[-1], MOST)))
         some = some.clip(max=len(points) - 1)
         kept.append(Stretch(log=log, run=number, points=points[some], part=part))
     return kept
-
-
-def _length(points: Array) -> Array:
-    """Return the length of the way, m, up to each of its points (k, 3) m."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
 def _pieces(inside: Bools) -> Iterator[slice]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfpath import __version__
-from kerfpath.arrays import Array, Bools, short_repr
+from kerfpath.arrays import Array, Bools, lengths_along, short_repr
 from kerfpath.auditor import (
     BOUND,
     MOST_ROUNDED,
@@ -433,7 +433,7 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
     If the contour passes the same place twice, the share of the length decides.
     """
     points = cut.T_part_tip[:, :3, 3]
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    way = lengths_along(points)
     guess = reference.s[0] + way / way[-1] * reference.length
     # A drawn line with few corners needs samples as close as the nodes of the cut.
     fine = np.linspace(reference.s[0], reference.s[-1], 8 * max(len(reference), len(points)))
@@ -910,7 +910,7 @@ def _closest(cut: ReadCut, contours: Sequence[ExpectedContour]) -> tuple[float, 
     Points at the same share of the length are compared.
     """
     points = cut.T_part_tip[:, :3, 3]
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    way = lengths_along(points)
     some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
     found = []
     for i, contour in enumerate(contours):

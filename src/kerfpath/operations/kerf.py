@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, floats, scalar, short_repr
+from kerfpath.arrays import Array, Bools, Ints, floats, lengths_along, scalar, short_repr
 from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations.surface import (
@@ -473,9 +473,7 @@ def _radius(contour: Contour, nodes: Ints) -> float:
     """
     turn, count = angle_between(*_ways_at(contour)), len(contour) - 1
     bent = np.flatnonzero(turn[:count] > STRAIGHT)
-    place = np.concatenate(
-        [[0.0], np.cumsum(np.linalg.norm(np.diff(contour.points, axis=0), axis=1))]
-    )
+    place = lengths_along(contour.points)
     apart = np.diff(place[bent], append=place[bent[:1]] + place[-1])
     nearer = np.minimum(apart, np.roll(apart, 1))
     is_here = np.isin(bent, nodes % count)
@@ -600,7 +598,7 @@ def lead_out(contour: Contour, length: float, **keywords: Unpack[LeadKeywords]) 
 
 def _share(points: Array, far: float, near: float) -> Array:
     """Return speed shares (m,) from the outer end of a lead to the contour."""
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    s = lengths_along(points)
     return np.asarray(far + (near - far) * s / s[-1])
 
 

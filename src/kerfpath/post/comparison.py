@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Ints, counted, short_repr
+from kerfpath.arrays import Array, Ints, counted, lengths_along, short_repr
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import air_times, cruises, distances
 from kerfpath.post.languages import Language, LanguageSettings, Rules
@@ -126,7 +126,7 @@ def _trace(group: ReadGroup) -> Array | None:
     points = _points(group.path)
     if not len(points):
         return None
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    way = lengths_along(points)
     at = np.linspace(0, way[-1], SAMPLES)
     return np.stack([np.interp(at, way, x) for x in points.T], axis=1)
 
