@@ -243,6 +243,10 @@ def test_what_is_followed_and_dropped_is_counted(circle, arm, tool, placement, c
     assert {*told.valleys} <= {*map(str, range(arm.postures)), "several"}
     assert told.screened > told.refined > 0
     assert min(told.dearer, told.alike, told.left) >= 0
+    # What is screened is dropped, refined, or among those that are not refined.
+    kept = told.screened - told.dropped
+    assert 0 < kept <= told.refined + told.dearer + told.alike + told.left
+    assert told.unfollowed == 0
     assert told.words.startswith("all valleys followed (")
     assert f"{told.refined} motions refined" in told.words
     one = plan(nodes, arm, postures=(1,), **where).proof.explored

@@ -280,6 +280,8 @@ class ExploredData(TypedDict):
     dearer: int
     alike: int
     left: int
+    dropped: NotRequired[int]
+    unfollowed: NotRequired[int]
 
 
 class PlanData(TypedDict):

@@ -90,7 +90,7 @@ class Exploration:
         for course in courses.followed:
             if not any(course.like(other) for other in self._begun):
                 tally.follow(course)
-        tally.left += courses.unfollowed
+        tally.unfollowed = courses.unfollowed
         self._refine(self._screened(every, SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
             before = self._best_cost
@@ -103,8 +103,10 @@ class Exploration:
         self, courses: list[Course], *ways: tuple[Stage, ...]
     ) -> list[tuple[float, Course]]:
         """Return what courses are screened to each way, with scores, best first."""
-        self._starts.tally.screened += len(courses)
-        return self._courses.screened(courses, *ways)
+        found, tally = self._courses.screened(courses, *ways), self._starts.tally
+        tally.screened += len(courses) * len(ways)
+        tally.dropped += len(courses) * len(ways) - len(found)
+        return found
 
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
         """Refine the best motions that are not known: so many, and the best of every posture."""

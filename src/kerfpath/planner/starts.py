@@ -53,6 +53,8 @@ class Tally:
     dearer: int = 0
     alike: int = 0
     left: int = 0
+    dropped: int = 0
+    unfollowed: int = 0
 
     def follow(self, course: Course) -> None:
         """Count a valley."""
@@ -60,16 +62,18 @@ class Tally:
         where = str(one) if (course.posture == one).all() else "several"
         self.valleys[where] = self.valleys.get(where, 0) + 1
 
-    def told(self, *, all_valleys: bool) -> Explored:
-        """Return the counts."""
+    def told(self, *, explored: bool) -> Explored:
+        """Return the counts; `explored`: whether the valleys were, beyond the cheapest."""
         return Explored(
             valleys=dict(sorted(self.valleys.items())),
-            all_valleys=all_valleys,
+            all_valleys=explored and not self.unfollowed,
             screened=self.screened,
             refined=self.refined,
             dearer=self.dearer,
             alike=self.alike,
             left=self.left,
+            dropped=self.dropped,
+            unfollowed=self.unfollowed,
         )
 
 
@@ -110,7 +114,7 @@ class Starts:
     @property
     def told(self) -> Explored:
         """What was followed and dropped so far."""
-        return self.tally.told(all_valleys=self.explored)
+        return self.tally.told(explored=self.explored)
 
     def above(self, value: float, share: float) -> bool:
         """Return whether the best motion costs more than (1 + share) times a value."""

@@ -148,20 +148,26 @@ class Explored:
         Number of valleys followed in each posture, by its number, or "several" for those that
         change posture.
     all_valleys : bool
-        Whether all valleys were explored, up to a number along the same nodes; otherwise only the
-        cheapest were followed, as the best motion costs hardly more than the cheapest course by (5)
-        alone, or as such tasks are searched by beams.
+        Whether all valleys were followed; otherwise only the cheapest were: for want of work, as
+        the best motion costs hardly more than the cheapest course by (5) alone, or as such tasks
+        are searched by beams.
     screened : int
-        Number of courses screened: through valleys, smoothed, of constant gamma, and changed ones.
+        Number of courses screened, once for each of two ways: through valleys, smoothed, of
+        constant gamma, and changed ones.
     refined : int
-        Number of motions refined.
+        Number of motions refined, from a screening or from elsewhere.
     dearer : int
-        Number of motions that were not refined because they cost more than the best one by more
-        than refinements gain.
+        Number of motions that were not refined because they are expected to cost more than the best
+        one by more than refinements gain: that is no bound.
     alike : int
         Number of those that were not refined because a refined one is nearly the same.
     left : int
-        Number of those that were not refined, and of valleys not followed, for want of work.
+        Number of those that were not refined for want of work.
+    dropped : int
+        Number of courses that the screening dropped: out of reach, nearly the same as a better one,
+        or with a worse score than those that it keeps.
+    unfollowed : int
+        Number of valleys known to be left that were not followed for want of work.
     """
 
     valleys: Mapping[str, int]
@@ -171,6 +177,8 @@ class Explored:
     dearer: int
     alike: int
     left: int
+    dropped: int = 0
+    unfollowed: int = 0
 
     __repr__ = short_repr
 
@@ -183,10 +191,12 @@ class Explored:
         )
         which = "all valleys" if self.all_valleys else "the cheapest valleys"
         begun = f"{which} followed ({places})" if places else "no valley followed"
+        if self.unfollowed:
+            begun += f", at least {self.unfollowed} not for want of work"
         return (
-            f"{begun}, {self.screened} courses screened, {self.refined} motions refined; not "
-            f"refined: {self.dearer} that cost more than the best, {self.alike} like a refined "
-            f"one, {self.left} for want of work"
+            f"{begun}; {self.screened} courses screened and {self.dropped} of them dropped, "
+            f"{self.refined} motions refined; not refined: {self.dearer} expected to cost more "
+            f"than the best, {self.alike} like a refined one, {self.left} for want of work"
         )
 
 
