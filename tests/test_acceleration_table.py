@@ -19,9 +19,16 @@ from kerfpath import (
     plan,
     robot,
 )
-from kerfpath.auditor.acceleration import largest_accelerations, scarcity
+from kerfpath.auditor.acceleration import largest_accelerations, most_accelerations, scarcity
+from kerfpath.certificate import cell_bounds
+from kerfpath.certifier import foldable
+from kerfpath.certifier.bound import bound_steps
+from kerfpath.certifier.cells import cell_maker
+from kerfpath.certifier.elimination import Elimination
+from kerfpath.certifier.stages import distinct_groups, solve_stage
+from kerfpath.certifier.tube import Duals, motion_through, tube_about
 from kerfpath.execution import executed, timing_of
-from kerfpath.kernels.change_table import change_factors
+from kerfpath.kernels.change_table import change_factors, most_factors
 from kerfpath.limits import Limits, rates_of
 from kerfpath.planner.folding import folds
 from kerfpath.post import build_program
@@ -125,6 +132,37 @@ def test_given_accelerations_replace_a_table_and_a_table_those_of_its_joints(tab
     assert railed.alone().limits.acceleration_table is both.limits.acceleration_table
 
 
+def test_the_largest_limit_over_a_box_is_that_at_a_corner_of_box_or_table(tabled):
+    rng, table = np.random.default_rng(9), tabled.limits.acceleration_table
+    middle = rng.uniform([-1.5, -3.6], [1.9, 1.5], (200, 2))
+    half = rng.choice([0.0, 1e-3, 0.1, 0.6, 9.0], (200, 1)) * rng.uniform(0, 1, (200, 2))
+    low, high = np.tile([-9.0] * 6, (200, 1)), np.tile([9.0] * 6, (200, 1))
+    low[:, 1:3], high[:, 1:3] = middle - half, middle + half
+    want = np.tile(tabled.acceleration, (200, 1))
+    for k in range(200):
+        lines = [
+            np.array([a, b, *nodes[(nodes > a) & (nodes < b)]])
+            for nodes, a, b in zip(
+                (table.joint_2, table.joint_3), low[k, 1:3], high[k, 1:3], strict=True
+            )
+        ]
+        # A box that sticks out of the table has its edges there, too.
+        for i, nodes in enumerate((table.joint_2, table.joint_3)):
+            lines[i] = np.append(lines[i], np.clip(nodes[[0, -1]], low[k, 1 + i], high[k, 1 + i]))
+        q = np.zeros((lines[0].size * lines[1].size, 6))
+        q[:, 1:3] = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2)
+        want[k, :3] = by_scipy(table, q).max(axis=0)
+    limits = Limits.of(*tabled.speed_limits(), table=table)
+    found = limits.acceleration.bound * most_factors(change_table(limits), low, high)
+    for each in (found, most_accelerations(tabled, low[:, 1:3], high[:, 1:3])):
+        np.testing.assert_allclose(each, want, rtol=4e-12)
+        assert (each >= want * (1 - 1e-15)).all()
+    everywhere = np.full((1, 2), np.inf)
+    np.testing.assert_allclose(
+        most_accelerations(tabled, -everywhere, everywhere)[0, :3], table.most, rtol=4e-12
+    )
+
+
 # Laws of plans.
 
 
@@ -135,6 +173,7 @@ def test_a_constant_table_gives_the_plan_of_the_constant_limits(arm, method, spe
     one, other = (planned(each, speed, **options) for each in (arm, same))
     np.testing.assert_array_equal(one.q, other.q)
     assert one.cost == other.cost
+    assert one.proof.bound == other.proof.bound
 
 
 def test_plans_keep_the_table_where_its_least_values_would_not_do(tabled):
@@ -222,15 +261,127 @@ def test_a_larger_table_is_never_worse():
     assert better > 3
 
 
-def test_bounds_hold_for_what_the_table_allows_at_most(tabled):
-    made = planned(tabled, 0.2, certify=Certify(keep=True))
-    assert made.proof.bound is not None
-    assert made.proof.bound <= made.cost
-    limits = made.settings.limits(tabled)
-    most = limits.acceleration.most_per_interval(1.0)
-    values = tabled.limits.acceleration_table.values
-    np.testing.assert_allclose(most[:3], values.max(axis=(0, 1)))
+@pytest.fixture(scope="module")
+def sharp(tabled):
+    """A plan whose accelerations are at the limit of the table, above what holds everywhere."""
+    task = {"tool": TOOL, "placement": PLACE, "gamma_step": STEP, "refine": True}
+    speed = fastest_speed(wave(), tabled, **task, explore=False).speed
+    made = planned(tabled, 0.995 * speed, refine=True, certify=None)
+    _, a = rates_of(made.increments, np.diff(made.time))
+    assert shares(made, tabled).max() > 0.98
+    assert (np.abs(a) / tabled.acceleration).max() > 1.2
+    return made
+
+
+def cells_about(made, nodes, halvings):
+    """Cells near a plan, some of them beside it; None of them leaves the plan out."""
+    steps = bound_steps(made)
+    maker = cell_maker(made, steps.weight)
+    cells = maker.coarsest(nodes)
+    for _ in range(halvings):
+        at, half = cell_bounds(cells.level, cells.index)
+        off = np.abs(np.angle(np.exp(1j * (at - made.gamma[cells.node]))))
+        near = (off < 4 * half) & (cells.posture == made.posture[cells.node])
+        cells = maker.halves(cells.take(near))
+    return steps, maker, cells
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3])
+def test_no_multipliers_prove_more_than_a_motion_at_the_limit_costs(sharp, stride):
+    """Pushing against the limits that bind: a limit that is too small would show at once."""
+    nodes = np.arange(0, len(sharp.q), stride)
+    steps, _, cells = cells_about(sharp, nodes, 5)
+    spans, rng = np.diff(nodes), np.random.default_rng(11)
+    u = np.diff(sharp.unwrapped[nodes], axis=0) / spans[:, None]
+    loose = replace(steps, everywhere=None)
+    better = 0
+    for _ in range(12):
+        nu = np.zeros((len(nodes), 6))
+        size = rng.uniform(0, 3, (len(nodes) - 2, 1)) * steps.weight
+        nu[1:-1] = np.sign(np.diff(u, axis=0)) * size * rng.integers(0, 2, (len(nodes) - 2, 6))
+        most = None if rng.integers(2) else sharp.cost
+        bound = solve_stage(cells, steps, nu, most=most).bound
+        assert bound <= sharp.cost
+        better += bound > solve_stage(cells, loose, nu, most=most).bound
+    assert better == 12
+
+
+def test_no_step_of_a_motion_at_the_limit_is_ruled_out(sharp):
+    steps, maker, cells = cells_about(sharp, np.arange(len(sharp.q)), 6)
+    one = Elimination(cells, steps)
+    assert one.forward() is None
+    left = one.cells.take(one.backward())
+    at, half = cell_bounds(left.level, left.index)
+    off = np.abs(np.angle(np.exp(1j * (at - sharp.gamma[left.node]))))
+    assert len(np.unique(left.node[off <= half * (1 + 1e-9)])) == len(sharp.q)
+    half = np.full(len(sharp.q), 0.01)
+    tube = tube_about(maker, np.arange(len(half)), sharp.gamma, half, sharp.posture)
+    tube, _ = tube.with_ties(steps, np.ones(len(half) - 1, int))
+    assert tube is not None
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        nu = np.zeros(sharp.q.shape)
+        nu[1:-1] = np.sign(np.diff(sharp.increments, axis=0)) * rng.uniform(
+            0, 2, (len(half) - 2, 1)
+        )
+        y = np.sign(sharp.increments) * steps.weight + nu[:-1] - nu[1:]
+        duals = Duals(y * rng.uniform(0.9, 1, y.shape), nu, rng.uniform(0, 1, len(tube.tied[1])))
+        assert tube.least(steps, np.ones(len(half) - 1, int), duals) <= sharp.cost
+
+
+def test_bounds_are_no_higher_than_random_motions_that_keep_the_table(sharp):
+    """Gamma of a plan with some room, changed at random: what keeps all limits by scipy's table."""
+    slower = planned(sharp.robot, 0.65, refine=True, certify=Certify(gap=0.002))
+    assert slower.proof.bound <= slower.cost
+    roomy = planned(sharp.robot, 0.65, refine=True, certify=None, eta_a=0.8, eta_v=0.9)
+    rng, kept = np.random.default_rng(3), 0
+    steps, maker, _ = cells_about(slower, np.arange(2), 0)
+    nodes = np.arange(len(slower.q))
+    for _ in range(300):
+        shift = np.cumsum(np.cumsum(rng.normal(size=len(nodes)))) * 10 ** rng.uniform(-7, -4)
+        q, u = motion_through(maker, nodes, roomy.gamma + shift, int(roomy.posture[0]))
+        if (np.abs(u) > steps.velocity).any():
+            continue
+        table, limit = (
+            sharp.robot.limits.acceleration_table,
+            np.tile(sharp.robot.acceleration, (len(q) - 2, 1)),
+        )
+        limit[:, table.joints] = by_scipy(table, q[1:-1])
+        if (np.abs(np.diff(u, axis=0)) <= limit * slower.dt**2).all():
+            kept += 1
+            assert slower.proof.bound <= steps.distance(u).sum()
+    assert kept > 20
+
+
+def test_a_kept_certificate_holds_with_the_table(tabled):
+    short = Contour(wave().points[:7], wave().axes[:7], closed=False)
+    task = {"tool": TOOL, "placement": PLACE, "gamma_step": STEP}
+    speed = 0.98 * fastest_speed(short, tabled, **task, refine=True).speed
+    made = plan(short, tabled, **task, speed=speed, refine=True, certify=Certify(keep=True))
+    assert shares(made, tabled).max() > 0.9
+    assert made.proof.certificate.branches
     assert not audit(made)
+
+
+def test_the_ceiling_by_the_table_is_above_the_speed_found(tabled):
+    task = {"tool": TOOL, "placement": PLACE, "gamma_step": STEP, "refine": True, "ceiling": True}
+    most = {i + 1: np.full((3, 3), v) for i, v in enumerate(tabled.limits.acceleration_table.most)}
+    loose = robot(NAME).with_limits(acceleration_table=AccelerationTable(**AXES, limits=most))
+    found, other = (fastest_speed(wave(), each, **task) for each in (tabled, loose))
+    assert found.speed < found.ceiling < 0.95 * other.ceiling
+
+
+def test_groups_on_another_turn_of_a_joint_of_the_table_are_not_the_same(tabled):
+    wide = tabled.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
+    plain = wide.with_limits(acceleration=tabled.acceleration)
+    count = {}
+    for arm in (wide, plain):
+        made = planned(arm, 0.2, certify=None)
+        _, maker, cells = cells_about(made, np.array([0, 5]), 3)
+        begin, to, kept = np.zeros(len(cells) + 1, int), np.zeros(0, int), np.ones(len(cells), bool)
+        count[arm] = len(distinct_groups(cells, begin, to, kept, maker))
+        assert foldable(arm, np.full(6, 0.1))[[1, 2]].any() == (arm is plain)
+    assert count[wide] > count[plain]
 
 
 def test_a_reduced_feed_keeps_the_table(tabled):

@@ -11,7 +11,7 @@ from kerfpath import Contour, InputError, plan, robot
 from kerfpath.auditor import certificate as certificate_module
 from kerfpath.auditor import certified_bound, checks
 from kerfpath.auditor import steps as steps_module
-from kerfpath.auditor.certificate import _rates, certificate_inputs
+from kerfpath.auditor.certificate import EVEN, _rates, _Task, certificate_inputs
 from kerfpath.auditor.cover import covered
 from kerfpath.auditor.steps import candidates, reduced_costs
 from kerfpath.certificate import Certificate
@@ -86,7 +86,7 @@ def test_no_step_costs_less_than_is_claimed(which, metric, request):
     of, rng = request.getfixturevalue(which), np.random.default_rng(3)
     settings = replace(of.settings, metric=metric)
     of = replace(of, settings=settings)
-    where, rates, _ = certificate_inputs(of)
+    where, rates = certificate_inputs(of)
     K, n = of.q.shape
     rates = replace(
         rates, velocity=rates.velocity * 20, tilt=rng.normal(size=(K - 1, n)) * rates.weights
@@ -143,7 +143,7 @@ def test_no_step_costs_less_than_is_claimed(which, metric, request):
 @pytest.mark.parametrize("which", ["made", "turning"])
 def test_the_pairs_are_those_that_a_step_may_join(which, request):
     of = request.getfixturevalue(which)
-    where, rates, _ = certificate_inputs(of)
+    where, rates = certificate_inputs(of)
     rates = replace(rates, velocity=rates.velocity * 5)
     node, posture, index, q, *_ = every_cell(of)
     at = covered(where, stage_of(node, posture, 0, index, q), None, None)
@@ -165,7 +165,7 @@ def test_a_step_costs_at_least_the_distance_of_its_cells(which, metric, request)
     # Without a potential: of every two boxes of joints, as far apart as they are.
     of = request.getfixturevalue(which)
     of = replace(of, settings=replace(of.settings, metric=metric))
-    where, rates, _ = certificate_inputs(of)
+    where, rates = certificate_inputs(of)
     # No joint goes so far that it could come round the other way.
     rates = replace(rates, velocity=np.minimum(rates.velocity * 20, 2.0))
     node, posture, index, q, *_ = every_cell(of)
@@ -245,16 +245,21 @@ def test_no_potential_proves_more_than_a_motion_costs(made, scale):
 
 def test_multipliers_cost_no_motion_that_keeps_the_acceleration(made):
     rng = np.random.default_rng(5)
-    _, rates, change = certificate_inputs(made)
+    task = _Task(*certificate_inputs(made), made)
     K, n = made.q.shape
     nu = np.zeros((K, n))
     nu[1:-1] = rng.normal(size=(K - 2, n))
     (stage,) = flat(made).stages
-    tilted, constant = _rates(replace(stage, multipliers=nu), rates, change)
-    u = made.increments
+    tilted = _rates(replace(stage, multipliers=nu), task.every)
+    u, at = made.increments, task.where
+    places = covered(at, stage, None, lambda found: np.ones(len(found), bool))
+    first = np.searchsorted(places.node, np.arange(K))
+    price = task.prices(nu, places.take(first)).sum()
+    usable = made.settings.limits(made.robot).acceleration.per_interval(made.dt)
+    change = usable * (1 + EVEN) ** 2 + 1e-9
     assert (np.abs(np.diff(u, axis=0)) <= change).all()
     direct = (nu[1:-1] * np.diff(u, axis=0)).sum() - (np.abs(nu[1:-1]) * change).sum()
-    assert (tilted.tilt * u).sum() + constant == pytest.approx(direct, abs=1e-9)
+    assert (tilted.tilt * u).sum() - price == pytest.approx(direct, abs=1e-9)
     assert direct <= 0
 
 

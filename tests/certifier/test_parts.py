@@ -12,7 +12,7 @@ from kerfpath.certifier import bound as proving
 from kerfpath.certifier import certify
 from kerfpath.certifier import stages as stage
 from kerfpath.certifier.multipliers import limit_prices
-from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
+from kerfpath.certifier.stages import Steps, bend_of, cross_bends, solve_stage
 from kerfpath.kernels import cell_elimination
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import CHEBYCHEV, EUCLID, MANHATTAN
@@ -178,14 +178,15 @@ def test_means_of_increments_differ_by_no_more_than_the_limit_of_long_steps(befo
     The rest is the tolerance of the limit.
     """
     rng = np.random.default_rng(5)
-    bend = steps(acceleration=0.7).bend(before, after)
+    bend = bend_of(before, after)
+    bound = 0.7 * bend.apart + 2 * LIMIT_TOLERANCE
     change = np.vstack([np.full(before + after - 1, 0.7), -np.full(before + after - 1, 0.7),
                         rng.uniform(-0.7, 0.7, (500, before + after - 1))])  # fmt: skip
     u = np.cumsum(np.pad(change, ((0, 0), (1, 0))), axis=1)
     first, second = u[:, :before].sum(axis=1), u[:, before:].sum(axis=1)
     differ = np.abs(bend.two * second - bend.one * first)
-    assert (differ <= bend.bound[0]).all()
-    assert differ[:2] == pytest.approx(bend.bound[0], abs=3 * LIMIT_TOLERANCE)
+    assert (differ <= bound).all()
+    assert differ[:2] == pytest.approx(bound, abs=3 * LIMIT_TOLERANCE)
 
 
 def test_prices_of_the_metrics_differ_where_joints_share_a_step():
@@ -226,7 +227,7 @@ def test_a_plan_at_the_limit_has_prices(metric, planned):
 def through_pairs(packed, steps, spans, result, most):
     """Slow and obvious: every pair of steps is tested, and every state kept."""
     step, layer = steps.over(1), np.repeat(np.arange(len(packed.start) - 1), np.diff(packed.start))
-    lead = np.argmax(np.abs(packed.slope) / steps.bend(1, 1).bound, axis=1)
+    lead = np.argmax(np.abs(packed.slope) / steps.acceleration, axis=1)
     begin, to, cost, behind = result
     onward = [list(range(begin[a], begin[a + 1])) for a in range(len(packed.half))]
     ending = [np.flatnonzero(to == a) for a in range(len(packed.half))]
@@ -236,7 +237,7 @@ def through_pairs(packed, steps, spans, result, most):
 
     def follows(e, f):
         b = to[e]
-        bend = steps.bend(int(spans[layer[b] - 1]), int(spans[layer[b]]))
+        bend = bend_of(int(spans[layer[b] - 1]), int(spans[layer[b]]))
         return bent_by(packed, step, bend, lead, origin[e], b, to[f], D) < 0
 
     until = {e: behind[origin[e]] + cost[e] for a in range(first) for e in onward[a]}

@@ -5,7 +5,7 @@ The audit interpolates tables of accelerations by itself: it shares no code with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -84,20 +84,40 @@ def _corners(robot: Robot, low: Array, high: Array) -> Iterator[Array]:
             yield q
 
 
-def most_accelerations(robot: Robot) -> Array:
-    """Return the largest accelerations (n,) rad/s^2 at any configuration."""
-    return _over_all(robot, np.max)
+def most_accelerations(robot: Robot, low: Array, high: Array) -> Array:
+    """Return the largest accelerations (B, n) rad/s^2 over boxes, or slightly more.
+
+    A limit in a table is largest at a corner: of the box, or where lines of the table cross it.
+
+    Parameters
+    ----------
+    robot : Robot
+    low, high : (B, 2) rad
+        Ends of joints 2 and 3; they may be infinite.
+    """
+    table = robot.limits.acceleration_table
+    found = np.tile(least_accelerations(robot), (len(low), 1))
+    if table is None:
+        return found
+    nodes = table.joint_2, table.joint_3
+    at = [np.clip(axis[:, None], low[:, i], high[:, i]) for i, axis in enumerate(nodes)]
+    new = [np.diff(x, axis=0, prepend=-np.inf) > 0 for x in at]
+    inside = np.ones(len(low), bool)
+    for i, axis in enumerate(nodes):
+        inside &= (low[:, i] <= axis[-1]) & (high[:, i] >= axis[0])
+    for x, other_x in zip(at[0], new[0], strict=True):
+        for y, other_y in zip(at[1], new[1], strict=True):
+            here = np.flatnonzero(inside & other_x & other_y)
+            q = np.zeros((len(here), robot.joints))
+            q[:, 1], q[:, 2] = x[here], y[here]
+            found[here] = np.maximum(found[here], largest_accelerations(robot, q))
+    return found * (1 + ROUNDED)
 
 
 def least_accelerations(robot: Robot) -> Array:
     """Return the accelerations (n,) rad/s^2 that hold at every configuration."""
-    return _over_all(robot, np.min)
-
-
-def _over_all(robot: Robot, extreme: Callable[[Array], float]) -> Array:
-    """Return the accelerations (n,), of joints with a table the extreme one of its nodes."""
     _, constant = robot.speed_limits()
     found, table = constant.copy(), robot.limits.acceleration_table
     for joint, nodes in {} if table is None else table.limits.items():
-        found[joint - 1] = extreme(nodes)
+        found[joint - 1] = nodes.min()
     return found

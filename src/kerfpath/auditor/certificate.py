@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.auditor.acceleration import most_accelerations
-from kerfpath.auditor.cover import DEEPEST_CELL, TURN, Places, Reachable, covered, one_interval
+from kerfpath.auditor.cover import (
+    DEEPEST_CELL,
+    HALF_TURN,
+    TURN,
+    Places,
+    Reachable,
+    covered,
+    one_interval,
+)
 from kerfpath.auditor.enclosure import POSTURES, linear_minimum
 from kerfpath.auditor.jets import UNIT
 from kerfpath.auditor.steps import (
@@ -122,14 +130,19 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Where the motions of a plan's task may be, the bounds of their steps, A of (6), the plan."""
+    """Where the motions of a plan's task may be, the bounds of their steps, and the plan."""
 
     where: Reachable
     every: Rates
-    change: Array
     plan: Plan
 
     __repr__ = short_repr
+
+    def prices(self, multipliers: Array | None, at: Places) -> Array:
+        """Return the most (C,) that multipliers (K, n) of (6) add to the cost at places."""
+        if multipliers is None:
+            return np.zeros(len(at))
+        return np.asarray((np.abs(multipliers)[at.node] * _changes(self.plan, at)).sum(axis=1))
 
 
 def _by_stages(
@@ -139,9 +152,9 @@ def _by_stages(
     proved, cost = -np.inf, task.plan.cost
     for stage in stages:
         _require_fit(stage, *task.plan.q.shape)
-        rates, constant = _rates(stage, task.every, task.change)
+        rates = _rates(stage, task.every)
         at = covered(task.where, stage, left, partial(linked, rates))
-        bounds = _through(rates, at, stage) + constant
+        bounds = _through(rates, at, stage, task.prices(stage.multipliers, at))
         proved = max(proved, _over_layers(rates.nodes, at.node, bounds))
         if proved >= cost:
             break
@@ -235,7 +248,8 @@ def _in_tube(task: _Task, left: Places, y: Array, nu: Array) -> float:
     found = one_interval(task.where, left) if len(np.unique(left.node)) == K else None
     if found is None:
         return -np.inf
-    return _by_duals(replace(task.every, tilt=tilt), *found, y, np.abs(nu) @ task.change)
+    whole, moved = found
+    return _by_duals(replace(task.every, tilt=tilt), whole, moved, y, task.prices(nu, whole))
 
 
 def _by_duals(rates: Rates, at: Places, moved: Array, y: Array, price: Array) -> float:
@@ -277,8 +291,8 @@ def _by_duals(rates: Rates, at: Places, moved: Array, y: Array, price: Array) ->
     return np.inf if none > 0 else cost
 
 
-def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
-    """Return where the motions of a plan's task may be, the bounds of their steps, and A of (6)."""
+def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates]:
+    """Return where the motions of a plan's task may be, and the bounds of their steps."""
     settings, robot = plan.settings, plan.robot
     tau = np.diff(plan.time)
     dt = float(tau.max())
@@ -292,7 +306,6 @@ def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
         if not known:
             raise CertificateRefused(f"certificates do not apply to {what}")
     limits, (velocity, _) = robot.joint_limits(), robot.speed_limits()
-    acceleration = most_accelerations(robot)
     endless = np.asarray(robot.endless, dtype=bool)
     lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
     if not (np.isfinite(lower) & np.isfinite(upper)).all():
@@ -319,7 +332,6 @@ def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
         )
     most = settings.eta_v * velocity * dt * (1 + 8 * UNIT) + LIMIT_TOLERANCE
     most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
-    change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
     K, n = plan.q.shape
     most = np.tile(most, (K - 1, 1))
     weights = np.asarray(settings.weights)
@@ -328,8 +340,17 @@ def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
     return (
         where,
         Rates(np.arange(K), most, weights, settings.metric, endless, np.zeros((K - 1, n))),
-        change,
     )
+
+
+def _changes(plan: Plan, at: Places) -> Array:
+    """Return A of (6) at places, the most that it allows on them, (C, n) rad."""
+    known = at.reach < HALF_TURN  # else only up to full turns
+    low, high = (np.where(known, at.q + side * at.reach, side * np.inf) for side in (-1, 1))
+    acceleration = most_accelerations(plan.robot, low[:, 1:3], high[:, 1:3])
+    dt = float(np.diff(plan.time).max())
+    change = plan.settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2
+    return np.asarray(change + LIMIT_TOLERANCE)
 
 
 def _require_fit(stage: Stage, K: int, n: int) -> None:
@@ -360,17 +381,8 @@ def _require_fit(stage: Stage, K: int, n: int) -> None:
             raise CertificateRefused(f"{name}: expected numbers up to {LARGEST:g}")
 
 
-def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
-    """Return the steps between the nodes of a stage, and the constant of its multipliers.
-
-    Parameters
-    ----------
-    stage : Stage
-    every : Rates
-        Steps between all nodes.
-    change : (n,) rad
-        Bound of (6).
-    """
+def _rates(stage: Stage, every: Rates) -> Rates:
+    """Return the steps between the nodes of a stage, from those between all nodes."""
     nodes = np.unique(stage.node).astype(np.int64)
     K, n = len(every.nodes), len(every.weights)
     if len(nodes) < 2 or nodes[0] != 0 or nodes[-1] != K - 1:
@@ -380,13 +392,11 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
     rates = replace(every, nodes=nodes, velocity=velocity, tilt=np.zeros(velocity.shape))
     nu = stage.multipliers
     if nu is None:
-        return rates, 0.0
+        return rates
     tilt = _tilt(nu, K, n)
     if len(nodes) < K:
         raise CertificateRefused("multipliers: expected cells at every node")
-    size = float((np.abs(nu) @ change).sum())
-    rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
-    return replace(rates, tilt=tilt), -size - 4 * UNIT * (K + n) * rounded
+    return replace(rates, tilt=tilt)
 
 
 def _tilt(nu: Array, K: int, n: int) -> Array:
@@ -400,10 +410,12 @@ def _tilt(nu: Array, K: int, n: int) -> Array:
     return np.asarray(nu[:-1] - nu[1:])
 
 
-def _through(rates: Rates, at: Places, stage: Stage) -> Array:
+def _through(rates: Rates, at: Places, stage: Stage, prices: Array) -> Array:
     """Return a lower bound (C,) on the cost of motions through each place; inf where none passes.
 
-    At the last node no cost remains, so the potential is taken as zero there.
+    At the last node no cost remains, so the potential is taken as zero there. ``prices`` (C,) are
+    the most that the multipliers of the stage add at each place: the most of each node is taken
+    off all motions, and what a place is below it is added to the steps from there.
     """
     layer, last = rates.layer(at), len(rates.nodes) - 1
     ends = (layer == last)[:, None]
@@ -411,11 +423,15 @@ def _through(rates: Rates, at: Places, stage: Stage) -> Array:
     dual = np.where(ends[..., None], 0.0, stage.dual[at.cell].astype(float))
     begun = np.where(layer == 0, least_value(at, value, dual), np.inf)
     ended = np.where(layer == last, 0.0, np.inf)
+    price = np.zeros(last + 1)
+    np.maximum.at(price, layer, prices)
+    spared = price[layer] - prices
     steps, held = list(steps_on(rates, at)), 0
     kept: list[list[Costs] | None] = []
     for both, places in steps:
         parts: list[Costs] | None = []
-        for a, b, cost in _costs(rates, places, value[both], dual[both]):
+        for a, b, reduced in _costs(rates, places, value[both], dual[both]):
+            cost = reduced + spared[both][a]
             np.minimum.at(begun[both], b, begun[both][a] + cost)
             held += len(a)
             if parts is not None:
@@ -424,10 +440,17 @@ def _through(rates: Rates, at: Places, stage: Stage) -> Array:
                 parts = None
         kept.append(parts)
     for (both, places), known in zip(reversed(steps), reversed(kept), strict=True):
-        for a, b, cost in known or _costs(rates, places, value[both], dual[both]):
+        for a, b, cost in known or (
+            (a, b, reduced + spared[both][a])
+            for a, b, reduced in _costs(rates, places, value[both], dual[both])
+        ):
             np.minimum.at(ended[both], a, ended[both][b] + cost)
-    whole = begun + ended
-    return whole - _rounding(rates, at, value, dual, whole)
+    whole, size = begun + ended, float(price.sum())
+    if stage.multipliers is not None:
+        nu, n = np.abs(stage.multipliers), len(rates.weights)
+        rounded = 2 * float(nu.sum(axis=0) @ rates.velocity.max(axis=0)) + size
+        size += 4 * UNIT * (len(nu) + n) * rounded
+    return whole - _rounding(rates, at, value, dual, whole) - size
 
 
 def _costs(rates: Rates, at: Places, value: Array, dual: Array) -> Iterator[Costs]:

@@ -29,7 +29,6 @@ from kerfpath.certifier.stages import (
 from kerfpath.certifier.tubes import Tubes
 from kerfpath.certifier.wide import thick, wide_bound
 from kerfpath.effort import current_effort
-from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.plans import OF_BOUND, Plan
 from kerfpath.progress import Progress, StopEarly, no_progress
 from kerfpath.search import METRIC_CODES, Course
@@ -286,12 +285,11 @@ def _also_for(plan: Plan) -> str:
 
 def bound_steps(plan: Plan) -> Steps:
     """Return the costs and limits of the steps of motions along the contour of a plan."""
-    asked, dt = plan.settings, float(np.diff(plan.time).max())
-    limits = asked.limits(plan.robot)
-    return Steps(
+    asked = plan.settings
+    return Steps.within(
+        asked.limits(plan.robot),
+        float(np.diff(plan.time).max()),
         weight=asked.weights,
-        velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-        acceleration=limits.acceleration.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
         metric=METRIC_CODES[asked.metric],
         endless=plan.robot.endless,
     )
@@ -503,7 +501,9 @@ class _Certification:
         posture = int(np.bincount(self.plan.posture).argmax())
         nodes = np.arange(self.last + 1)
         near = (self._prices(nodes, self.plan.gamma, posture, NARROW, most) for most in DEAREST)
-        most = max(self.steps.price(prices, np.diff(nodes)) for prices in near)
+        spans = np.diff(nodes)
+        change = self.steps.changes(self.plan.q, 0.0, spans, nodes)
+        most = max(self.steps.price(prices, spans, change) for prices in near)
         return most > self.cost - self.target
 
     def _prices(
@@ -517,7 +517,9 @@ class _Certification:
             return None
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        return limit_prices(u, slope, self.steps, np.diff(nodes), reach, most)
+        spans = np.diff(nodes)
+        change = self.steps.changes(q, 0.0, spans, np.arange(len(nodes)))
+        return limit_prices(u, slope, self.steps, spans, reach, most, change)
 
     def _divide(self, cells: CellSet) -> None:
         """Continue with multipliers of (6), part by part: in tubes, or at the layers of (6)."""

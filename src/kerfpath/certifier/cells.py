@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from kerfpath.acceleration_table import OVER
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certificate import BASE, LIFTS, cell_bounds
 from kerfpath.plans import Plan
@@ -147,12 +148,20 @@ def foldable(robot: Robot, farthest: Array) -> Bools:
     """Return which joints (n,) of the arm may count as endless though they have a range.
 
     The range is at least a turn. Each step moves a joint by at most the ``farthest`` (n,) rad, less
-    than half a turn, so that the increments of a motion are the same modulo turns.
+    than half a turn, so that the increments of a motion are the same modulo turns. Joints over
+    which accelerations have a table do not count.
     """
     limits = robot.joint_limits()
     wide = limits.upper - limits.lower >= TURN
+    wide &= ~_placed(robot)
     wide[robot.arm.joints :] = False
     return np.asarray(wide & (farthest < np.pi) & ~limits.endless)
+
+
+def _placed(robot: Robot) -> Bools:
+    """Return the joints (n,) over which accelerations have a table, so that their turns matter."""
+    tabled = robot.limits.acceleration_table is not None
+    return np.asarray(tabled & np.isin(np.arange(robot.joints), OVER))
 
 
 def cell_maker(
@@ -215,6 +224,8 @@ class CellMaker:
         Which joints are angles that are known up to full turns.
     endless : (n,) bool
         With the folded ones.
+    placed : (n,) bool
+        Joints whose turns matter for (6).
     flip : tuple, optional
         As `Arm.flip`.
     """
@@ -248,6 +259,7 @@ class CellMaker:
         used = range(robot.postures) if postures is None else sorted(postures)
         self._postures, self._width = np.array(used, np.int8), width
         self.endless, self.flip = limits.endless, robot.arm.flip
+        self.placed = _placed(robot)
         self._cone, self._axes = cone * (1 + BARELY), robot.externals
         self._weight = np.ones(len(limits.endless)) if weight is None else np.asarray(weight)
         self._first_at, self._first_reach = self._first_parameters()
@@ -312,18 +324,29 @@ class CellMaker:
         """Return the approximate joints at gamma (M,) at nodes, in a posture, and their slopes.
 
         Both are (M, n), rad and rad/rad. Also returned is whether the posture reaches each (M,).
+        Joints are on any turn, those that are `placed` near the middles of their ranges.
         """
         half = np.full(len(gamma), SLIGHT)
         found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
-        return found.center[:, posture], found.slope[:, posture], found.status[:, posture] > 0
+        q = self._on_turns(found.center[:, posture])
+        return q, found.slope[:, posture], found.status[:, posture] > 0
+
+    def _on_turns(self, q: Array) -> Array:
+        """Return joints (M, n) with those that are `placed` near the middles of their ranges."""
+        limits, at = self._limits, self.placed
+        if at.any():
+            middle = (limits.lower + limits.upper)[at] / 2
+            q = q.copy()
+            q[:, at] -= TURN * np.rint((q[:, at] - middle) / TURN)
+        return q
 
     def curves(
         self, nodes: Ints, gamma: Array, half: Array, posture: Ints
     ) -> tuple[Array, Array, Array, Array] | None:
         """Return center, slope, bend and spread (M, n) on one interval of gamma at each node.
 
-        They are as in `CellSet`, on any turn. None if a posture (M,) has no solution on its
-        interval.
+        They are as in `CellSet`, on turns as by `joints`. None if a posture (M,) has no solution on
+        its interval.
         """
         found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
         each, h = (np.arange(len(nodes)), posture), half[:, None]
@@ -332,7 +355,7 @@ class CellMaker:
         low, high, slope = found.low[each], found.high[each], found.slope[each]
         spread = found.radius[each] + self._width * (high - low) * h**2 / 4
         spread = spread * (1 + ROUNDED) + ROUNDED * (1 + np.abs(slope) * h)
-        return found.center[each], slope, (low + high) / 2, spread
+        return self._on_turns(found.center[each]), slope, (low + high) / 2, spread
 
     def fits(self, course: Array) -> bool:
         """Return whether a course (K, n) rad is in the ranges on some turn, and above the floor.

@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Bools, Ints, short_repr
 from kerfpath.certifier.cells import CellSet
-from kerfpath.certifier.stages import Steps, arranged
+from kerfpath.certifier.stages import Steps, arranged, bend_of
 from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
 from kerfpath.kernels.cell_elimination import (
@@ -43,7 +43,7 @@ class Elimination:
         self.cells, self._packed, nodes, _ = arranged(cells, steps)
         spans = np.diff(nodes).tolist()
         self._steps = [steps.over(span) for span in spans]
-        self._bends = [steps.bend(*pair) for pair in pairwise(spans)]
+        self._bends = [bend_of(*pair) for pair in pairwise(spans)]
         moved = np.abs(self.cells.slope)
         self._lead_v = np.argmax(moved / steps.velocity, axis=1)
         self._lead_a = np.argmax(moved / steps.acceleration, axis=1)

@@ -72,11 +72,9 @@ class _Excess:
 
     def __init__(self, steps: Steps, nodes: Ints) -> None:
         self._of = TubeRows(steps, nodes, 1)
-        over = self._of.own
-        (bent, change), (u, velocity) = self._of.bend, self._of.move
-        faster, sharper = (sparse.csr_array(a[:, None]) @ over for a in (velocity, change))
-        pairs = [(bent - sharper, change), (-bent - sharper, change)]
-        pairs += [(u - faster, velocity), (-u - faster, velocity)]
+        over, (u, velocity) = self._of.own, self._of.move
+        faster = sparse.csr_array(velocity[:, None]) @ over
+        pairs = [(u - faster, velocity), (-u - faster, velocity)]
         pairs += [(-over, np.zeros(1)), *self._of.powers]
         rows, right = zip(*pairs, strict=True)
         self._rows, self._right = sparse.csr_array(sparse.vstack(rows)), np.concatenate(right)
@@ -87,9 +85,12 @@ class _Excess:
     def solve(self, tube: Tube) -> tuple[Duals, Array] | None:
         """Return duals, and gamma (M,) of the motion found; None if the solver fails."""
         link, wide = self._of.of(tube)
-        bounds = np.concatenate([wide, self._right])
+        bend, change = self._of.bend, tube.bent(self._of.steps, self.spans).ravel()
+        sharper = sparse.csr_array(change[:, None]) @ self._of.own
+        rows = sparse.vstack([link, bend - sharper, -bend - sharper, self._rows])
+        bounds = np.concatenate([wide, change, change, self._right])
         cones = [NonnegativeConeT(len(bounds))]
-        found = minimise(self._cost, sparse.vstack([link, self._rows]), bounds, cones, threads=1)
+        found = minimise(self._cost, rows, bounds, cones, threads=1)
         if not (np.isfinite(found.dual).all() and np.isfinite(found.x).all()):
             return None
         t = np.clip(found.x[: len(tube.half)], -1.0, 1.0)
@@ -231,7 +232,7 @@ class EmptyTubes:
     def _excess(self, gamma: Array, nodes: Ints, posture: int) -> float:
         """Return by which share of the limits a motion with gamma (M,) exceeds them at most."""
         motion = motion_through(self._maker, nodes, gamma, posture)
-        return np.inf if motion is None else limit_share(motion[1], np.diff(nodes), self._steps) - 1
+        return np.inf if motion is None else limit_share(*motion, np.diff(nodes), self._steps) - 1
 
     def _passes(self, gamma: Array, nodes: Ints, posture: int) -> bool:
         """Return whether a motion near gamma (M,) passes all nodes; the whole one is kept."""

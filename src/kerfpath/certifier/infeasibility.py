@@ -13,7 +13,6 @@ from kerfpath.certifier.empty_tubes import EmptyTubes, binding_window
 from kerfpath.certifier.stages import Steps
 from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
-from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
@@ -107,10 +106,10 @@ class MotionTest:
         then grows to more nodes where motions pass it. With ``binding``, gamma and posture (K,) of
         a motion that exceeds the limits, it begins with the part where limits bind this motion.
         """
-        steps = Steps(
+        steps = Steps.within(
+            limits,
+            dt,
             weight=freeze(np.zeros(len(self._endless))),
-            velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-            acceleration=limits.acceleration.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
             metric=MANHATTAN,
             endless=self._endless,
         )

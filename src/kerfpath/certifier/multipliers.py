@@ -26,8 +26,9 @@ NOTHING = 1e-4
 
 
 def limit_prices(
-    u: Array, slope: Array, steps: Steps, spans: Ints, reach: float, most: float
-) -> Array | None:
+    u: Array, slope: Array, steps: Steps, spans: Ints, reach: float, most: float,
+    change: Array | None = None,
+) -> Array | None:  # fmt: skip
     """Return prices (M, n) of (6) for a motion at M layers, zero at the first and the last.
 
     None if (6) cannot bind, or if the program has no solution.
@@ -47,6 +48,8 @@ def limit_prices(
         The largest price per interval, in weights, which is the penalty for breaking (6) in the
         program; see `LEAST_WORTH`. Large prices give better bounds close to the motion, and worse
         ones farther away.
+    change : (M, n) or (1, n) rad, optional
+        Bound (6) at the layers, as by `Steps.changes`; default: where it allows most.
     """
     edges, n = u.shape
     weight, own = np.tile(steps.weight, edges), u.ravel()
@@ -55,8 +58,9 @@ def limit_prices(
     each, apart = np.repeat(spans / 1.0, n), np.repeat((spans[:-1] + spans[1:]) / 2, n)
     mean = sparse.diags_array(1 / each) @ moved
     bent, bend = mean[n:] - mean[:-n], np.diff(u / spans[:, None], axis=0).ravel()
+    own_change = steps.acceleration if change is None else change
     bound, velocity = (
-        apart * np.tile(steps.acceleration, edges - 1),
+        apart * np.broadcast_to(own_change, (edges + 1, n))[1:-1].ravel(),
         each * np.tile(steps.velocity, edges),
     )
     span = abs(moved).sum(axis=1)

@@ -44,7 +44,7 @@ class Changes(NamedTuple):
 
 
 def steps_of_gamma(
-    power: Array, spread: Array, half: Array, spans: Ints, steps: Steps
+    power: Array, spread: Array, half: Array, spans: Ints, steps: Steps, change: Array
 ) -> tuple[Changes | None, int]:
     """Return the changes of gamma that motions of a tube may make; None if there is no motion.
 
@@ -59,10 +59,11 @@ def steps_of_gamma(
     half : (M,) rad
     spans : (M - 1,)
     steps : Steps
+    change : (M - 2, n) rad
+        Bound (6) at the layers between the first and the last, by their distance.
     """
     before, after = spans[:-1].astype(float), spans[1:].astype(float)
     velocity = np.stack([steps.over(int(m)).velocity for m in spans])
-    bend = steps.acceleration * ((before + after) / 2)[:, None]
     h, order = half[:, None], np.arange(1, 4)[:, None, None]
     moved = np.diff(power[:, 0], axis=0)
     apart = np.maximum(h[1:], h[:-1])
@@ -97,7 +98,7 @@ def steps_of_gamma(
         down = np.minimum(lowest * low, lowest * top) / 2
         up = np.maximum(highest * low, highest * top) / 2
         loose = unsure + drift[1] * far[1:, None] * two + drift[0] * far[:-1, None] * one
-        found = _quotients(-bend - level - loose - up, bend - level + loose - down, *slope)
+        found = _quotients(-change - level - loose - up, change - level + loose - down, *slope)
         bend_least = np.maximum(bend_least, found[0])
         bend_least = np.maximum(bend_least, least[1:] / after - most[:-1] / before)
         bend_most = np.minimum(bend_most, found[1])

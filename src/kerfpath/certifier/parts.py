@@ -188,7 +188,8 @@ class Parts:
         if len(spans) + 1 != len(prices):
             return np.inf
         steps = self._steps
-        return steps.priced(increments(motion.center, steps.endless), prices, spans)
+        change = steps.changes(motion.center, motion.box, spans, np.arange(len(prices)))
+        return steps.priced(increments(motion.center, steps.endless), prices, spans, change)
 
     def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:
         most = self._cost * (1 + SAME_COST)

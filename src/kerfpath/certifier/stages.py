@@ -23,10 +23,13 @@ from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.effort import thread_count
 from kerfpath.kernels.bends import cross_back, cross_on
 from kerfpath.kernels.cell_elimination import Bend
+from kerfpath.kernels.change_table import NO_TABLE, ChangeTable, most_factors
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangents
+from kerfpath.limits import Limits
+from kerfpath.search import change_table
 
 # -----------------------------------------------------------------------------
 # Costs and limits of the steps of a motion, and the prices of (6).
@@ -49,7 +52,8 @@ class Steps:
     ----------
     weight : (n,) 1/rad
     velocity, acceleration : (n,) rad
-        Bounds (5) and (6) on an increment and on its change, tolerance included.
+        Bounds (5) and (6) on an increment and on its change, tolerance included; (6) as it is
+        where a table allows most.
     metric : int
         Code of the metric.
     endless : (n,) bool
@@ -57,6 +61,8 @@ class Steps:
         Largest cost of a step; infinite for no limit.
     farthest : float or (n,) rad
         Largest increment of a joint in a step over any number of intervals.
+    table, everywhere : ChangeTable, (n,) rad
+        Where (6) depends on the configuration, the factors on what holds everywhere.
     """
 
     weight: Array
@@ -66,8 +72,52 @@ class Steps:
     endless: Bools
     most: float = np.inf
     farthest: float | Array = np.inf
+    table: ChangeTable = NO_TABLE
+    everywhere: Array | None = None
 
     __repr__ = short_repr
+
+    @classmethod
+    def within(
+        cls, limits: Limits, dt: float, *, weight: Array, metric: int, endless: Bools
+    ) -> Steps:
+        """Return the steps of motions within limits, with nodes `dt` s apart."""
+        change = limits.acceleration
+        return cls(
+            weight=weight,
+            velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            acceleration=change.most_per_interval(dt) + 2 * LIMIT_TOLERANCE,
+            metric=metric,
+            endless=endless,
+            table=change_table(limits),
+            everywhere=change.per_interval(dt),
+        )
+
+    def changes(self, middle: Array, reach: Array | float, spans: Ints, layer: Ints) -> Array:
+        """Return bound (6) about boxes, (C, n) rad; (1, n) if it is the same everywhere.
+
+        Where the steps to a box and from it span several intervals, it is the mean of the bounds
+        at their nodes, as each counts by its distance: there joints are within (5) of the box.
+
+        Parameters
+        ----------
+        middle, reach : (C, n) rad
+            Boxes of the joints, on their turns.
+        spans : (M - 1,)
+            The intervals between the layers.
+        layer : (C,)
+            That of each box.
+        """
+        if self.everywhere is None or not len(self.table.joint_2):
+            return self.acceleration[None]
+        before, after = np.append(1, spans)[layer], np.append(spans, 1)[layer]
+        factor = own = most_factors(self.table, middle - reach, middle + reach)
+        for far in range(1, int(spans.max(initial=1))):
+            wide = reach + far * self.velocity
+            there = most_factors(self.table, middle - wide, middle + wide)
+            share = sum(np.maximum(1 - far / each, 0.0) for each in (before, after))
+            factor = factor + (share / ((before + after) / 2))[:, None] * (there - own)
+        return np.asarray(self.everywhere * factor + 2 * LIMIT_TOLERANCE)
 
     def over(self, intervals: int) -> Step:
         """Return the step over several intervals, which costs at most their sum (14)."""
@@ -98,17 +148,27 @@ class Steps:
             return step
         return step._replace(tilt=(multipliers[k] - multipliers[k + 1]) / spans[k])
 
-    def price(self, multipliers: Array | None, spans: Ints) -> float:
+    def prices(self, multipliers: Array, spans: Ints, change: Array, layer: Ints) -> Array:
+        """Return the most (C,) that multipliers (M, n) add on layers where (6) is as `changes`."""
+        apart = np.pad((spans[:-1] + spans[1:]) / 2, 1)
+        return np.asarray(apart[layer] * (np.abs(multipliers)[layer] * change).sum(axis=1))
+
+    def price(self, multipliers: Array | None, spans: Ints, change: Array | None = None) -> float:
         """Return the price of the multipliers (M, n): the most that they add where (6) holds.
 
-        It includes the rounding of the tilts of all steps.
+        (6) is as `changes` for each layer, by default where it allows most. The rounding of the
+        tilts of all steps is included.
         """
         if multipliers is None:
             return 0.0
-        apart = (spans[:-1] + spans[1:]) / 2
-        size = np.abs(multipliers)
-        most = apart @ (size[1:-1] @ self.acceleration)
-        return float(most + ROUNDED * (most + (size @ self.velocity).sum()))
+        change = self.acceleration[None] if change is None else change
+        each = self.prices(multipliers, spans, change, np.arange(len(multipliers)))
+        return self.rounded_price(each, multipliers)
+
+    def rounded_price(self, each: Array, multipliers: Array) -> float:
+        """Return the sum of prices (M,) with the rounding of the tilts of all steps."""
+        most = each.sum()
+        return float(most + ROUNDED * (most + (np.abs(multipliers) @ self.velocity).sum()))
 
     def distance(self, dq: Array) -> Array:
         """Return the distances (...,) of increments (..., n)."""
@@ -119,16 +179,16 @@ class Steps:
             return np.asarray(each.max(axis=-1))
         return np.asarray(np.sqrt((each**2).sum(axis=-1)))
 
-    def priced(self, dq: Array, multipliers: Array, spans: Ints) -> float:
+    def priced(self, dq: Array, multipliers: Array, spans: Ints, change: Array) -> float:
         """Return the cost of increments (M - 1, n) with the multipliers (M, n) of (6)."""
         tilt = (multipliers[:-1] - multipliers[1:]) / spans[:, None]
         moved = float(self.distance(dq).sum() + (tilt * dq).sum())
-        return moved - self.price(multipliers, spans)
+        return moved - self.price(multipliers, spans, change)
 
-    def bend(self, before: int, after: int) -> Bend:
-        """Return limit (6) of a step over some intervals and the next one."""
-        bound = self.acceleration * ((before + after) / 2) + 2 * LIMIT_TOLERANCE
-        return Bend(bound, 1 / before, 1 / after)
+
+def bend_of(before: int, after: int) -> Bend:
+    """Return the steps over some intervals and over those after, to which (6) applies."""
+    return Bend((before + after) / 2, 1 / before, 1 / after)
 
 
 # -----------------------------------------------------------------------------
@@ -159,9 +219,13 @@ def cross_bends(
         leaves of their price unused.
     """
     start, step = packed.start, steps.over(1)
-    nu, price = _unused_of(steps, spans, multipliers)
-    lead = np.argmax(np.abs(packed.slope) / steps.bend(1, 1).bound, axis=1)
-    bends = [steps.bend(*pair) for pair in pairwise(spans.tolist())]
+    nu, price = np.zeros((len(start) - 1, len(steps.weight))), np.zeros(len(behind))
+    if multipliers is not None:
+        layer = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        nu = multipliers
+        price = steps.prices(nu, spans, packed.change, layer) * (1 - ROUNDED)
+    lead = np.argmax(np.abs(packed.slope) / steps.acceleration, axis=1)
+    bends = [bend_of(*pair) for pair in pairwise(spans.tolist())]
     origin = np.repeat(np.arange(len(behind)), np.diff(begin))
     until = np.full(len(to), np.inf)  # up to the end of each step
     onward = np.full(len(to), np.inf)  # from there on
@@ -177,7 +241,7 @@ def cross_bends(
         in_begin = np.searchsorted(to[ending], np.arange(first, last + 1))
         tests += cross_on(
             packed, step, bends[k - 1], lead, first, last, begin, to, origin, ending, in_begin,
-            cost, ahead, most, nu[k], float(price[k]), until,
+            cost, ahead, most, nu[k], price, until,
         )  # fmt: skip
     onward[edges[-1]] = 0.0
     for k in range(layers - 2, 0, -1):
@@ -191,22 +255,13 @@ def cross_bends(
         ending = np.arange(edges[k - 1].start, edges[k - 1].stop)
         tests += cross_back(
             packed, step, bends[k - 1], lead, first, last, to, origin, leaving, on_begin,
-            ending[np.isfinite(until[ending])], cost, until, most, nu[k], float(price[k]), onward,
+            ending[np.isfinite(until[ending])], cost, until, most, nu[k], price, onward,
         )  # fmt: skip
     through = np.full(len(behind), np.inf)
     whole = until + onward
     np.minimum.at(through, origin, whole)
     np.minimum.at(through, to[edges[-1]], until[edges[-1]])
     return through, tests
-
-
-def _unused_of(steps: Steps, spans: Ints, multipliers: Array | None) -> tuple[Array, Array]:
-    """Return multipliers (M, n) and the most that they add at each layer (M,), rounded down."""
-    M = len(spans) + 1
-    if multipliers is None:
-        return np.zeros((M, len(steps.weight))), np.zeros(M)
-    apart = np.pad((spans[:-1] + spans[1:]) / 2, 1)
-    return multipliers, apart * (np.abs(multipliers) @ steps.acceleration) * (1 - ROUNDED)
 
 
 # -----------------------------------------------------------------------------
@@ -336,7 +391,12 @@ def solve_stage(
         raise ValueError("multipliers of (6) need cells at each of their nodes, and at no other")
     start = packed.start
     C, n = cells.center.shape
-    first, price = slice(start[0], start[1]), steps.price(multipliers, spans)
+    first, price, spared = slice(start[0], start[1]), 0.0, np.zeros(C)
+    if multipliers is not None:
+        layer = np.repeat(np.arange(len(nodes)), np.diff(start))
+        each = steps.prices(multipliers, spans, packed.change, layer)
+        most_of = np.maximum.reduceat(each, start[:-1])
+        price, spared = steps.rounded_price(most_of, multipliers), most_of[layer] - each
     while True:
         potential = Potential(
             np.full((C, 2), np.inf),
@@ -355,6 +415,7 @@ def solve_stage(
         if not (least := float(behind[first].min())) < low:
             break
         low = least  # the potential does not depend on the steps that are left out
+    cost += np.repeat(spared, np.diff(begin))  # what the price of the layer exceeds the cell's by
     cross_cells(start, begin, to, cost, ahead, behind)
     through = ahead + behind
     tests = 0
@@ -410,7 +471,9 @@ def arranged(cells: CellSet, steps: Steps) -> Arranged:
     widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
     curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
     by_joint = np.ascontiguousarray(cells.center.T), np.ascontiguousarray(box.T)
-    more = cells.tied, cells.reach, *by_joint
+    layer = np.repeat(np.arange(len(nodes)), np.diff(start, append=len(cells)))
+    change = steps.changes(cells.center, box, np.diff(nodes), layer)
+    more = cells.tied, cells.reach, *by_joint, change
     packed = Cells(np.append(start, len(cells)), *curves, key, widest, *more)
     return Arranged(cells, packed, nodes.astype(np.int64), order)
 
@@ -504,7 +567,8 @@ def distinct_groups(
 
     A group is left out if another one contains it up to whole turns of the joints or a flipped
     wrist (`Arm.flip`): each motion through it then has a counterpart through the other one at the
-    same cost, as (5), (6) and the cost depend only on the sizes of increments.
+    same cost, as (5), (6) and the cost depend only on the sizes of increments, and (6) on the turns
+    of joints over which there is a table (`CellMaker.placed`).
     """
     labels, count = _joined(begin, to, kept)
     if count < 2:
@@ -539,10 +603,11 @@ def _codes(cells: CellSet, maker: CellMaker) -> tuple[Ints, Ints]:
     wrist can be flipped, the numbers of the cells with the wrist flipped follow, (2 C,) each.
     """
     sets = [cells] if maker.flip is None else [cells, cells.flipped(*maker.flip)]
+    center = np.concatenate([c.center for c in sets])
     name = np.concatenate(
         [np.column_stack([c.node, c.posture, c.level, c.index, c.at, c.reach]) for c in sets]
     )
-    center = np.concatenate([c.center for c in sets])
+    name = np.column_stack([name, np.rint(center[:, maker.placed] / np.pi)])
     _, first, which = np.unique(name, axis=0, return_index=True, return_inverse=True)
     which = which.ravel()
     halves = np.rint((center - center[first[which]]) / np.pi).astype(np.int64)

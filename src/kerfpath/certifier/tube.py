@@ -86,12 +86,22 @@ class Tube:
         """Largest distance (M, n) of a joint from its centre."""
         return np.asarray(np.abs(self.scaled[:, 1:]).sum(axis=1) + self.spread)
 
+    def limits(self, steps: Steps, spans: Ints) -> Array:
+        """Return bound (6) in the tube, as `Steps.changes`."""
+        return steps.changes(self.center, self.box, spans, np.arange(len(self.half)))
+
+    def bent(self, steps: Steps, spans: Ints) -> Array:
+        """Return the most (M - 2, n) rad by which the means of two steps differ by (6)."""
+        change = np.broadcast_to(self.limits(steps, spans), self.center.shape)[1:-1]
+        return np.asarray(change * ((spans[:-1] + spans[1:]) / 2)[:, None])
+
     def with_ties(self, steps: Steps, spans: Ints) -> tuple[Tube | None, int]:
         """Return the tube with what its steps must keep; None if it has no motion at all.
 
         Then the second is the layer that rules all out.
         """
-        found, layer = steps_of_gamma(self.power, self.spread, self.half, spans, steps)
+        change = self.bent(steps, spans)
+        found, layer = steps_of_gamma(self.power, self.spread, self.half, spans, steps, change)
         if found is None:
             return None, layer
         return replace(self, changes=found, tied=ties(found, self.half, spans)), 0
@@ -113,7 +123,7 @@ class Tube:
         size, scaled = np.abs(force), self.scaled
         value = np.einsum("kn,kpn->kp", force, scaled)
         sizes = (size * (np.abs(scaled).sum(axis=1) + self.spread)).sum()
-        price, paid = steps.price(nu, spans), 0.0
+        price, paid = steps.price(nu, spans, self.limits(steps, spans)), 0.0
         if self.tied is not None:
             rows, most = self.tied
             count = np.maximum(duals.ties, 0.0)
@@ -154,8 +164,8 @@ class TubeRows:
 
     The variables are gamma in half-widths (M,), its squares (M,), its cubes (M,), the increments of
     the joints (M - 1, n) in a row, and `more` of the program's own; `gamma`, `square`, `step` and
-    `own` are the rows of the identity that pick them. Rows come in pairs of a matrix and its
-    largest values.
+    `own` are the rows of the identity that pick them, and `bend` the rows by which (6) bounds the
+    changes of the mean increments. Rows come in pairs of a matrix and its largest values.
     """
 
     def __init__(self, steps: Steps, nodes: Ints, more: int) -> None:
@@ -168,8 +178,7 @@ class TubeRows:
         self.step, self.own = eye[3 * M : 3 * M + size], eye[3 * M + size :]
         each = np.repeat(self.spans.astype(float), n)
         mean: Any = sparse.csr_array(sparse.diags_array(1 / each) @ self.step)
-        apart = (self.spans[:-1] + self.spans[1:]) / 2
-        self.bend = mean[n:] - mean[:-n], np.outer(apart, steps.acceleration).ravel()
+        self.steps, self.bend = steps, mean[n:] - mean[:-n]
         velocity = [steps.over(int(m)).velocity for m in self.spans]
         self.move = self.step, np.concatenate(velocity)
         one, t, w = np.ones(M), self.gamma, self.square
@@ -248,12 +257,13 @@ def motion_through(
     return q, u - np.where(maker.turns, TURN * np.rint(u / TURN), 0.0)
 
 
-def limit_share(u: Array, spans: Ints, steps: Steps) -> float:
-    """Return the largest share of (5) and (6) that increments u (M - 1, n) take."""
+def limit_share(q: Array, u: Array, spans: Ints, steps: Steps) -> float:
+    """Return the largest share of (5) and (6) that increments u (M - 1, n) at q (M, n) take."""
     rate, apart = u / spans[:, None], ((spans[:-1] + spans[1:]) / 2)[:, None]
     bent = np.diff(rate, axis=0) / apart
     fast = np.abs(rate / steps.velocity).max()
-    return float(max(fast, np.abs(bent / steps.acceleration).max(initial=0.0)))
+    change = np.broadcast_to(steps.changes(q, 0.0, spans, np.arange(len(q))), q.shape)[1:-1]
+    return float(max(fast, np.abs(bent / change).max(initial=0.0)))
 
 
 def finer(maker: CellMaker, cells: CellSet, last: int, across: int) -> CellSet:

@@ -88,12 +88,13 @@ class _Program:
         self._of = one = TubeRows(steps, nodes, lengths)
         self.spans, first = one.spans, one.count - lengths
         moved = sparse.diags_array(np.tile(steps.weight, edges)) @ one.step
-        (bent, change), (u, velocity) = one.bend, one.move
-        pairs = [(bent, change), (-bent, change), (u, velocity), (-u, velocity)]
+        u, velocity = one.move
+        pairs: list[tuple[Any, Array]] = [(u, velocity), (-u, velocity)]
         pairs += one.powers
         if manhattan:
             pairs += [(moved - one.own, np.zeros(size)), (-moved - one.own, np.zeros(size))]
         held = sum(len(bound) for _, bound in pairs)
+        held += 2 * one.bend.shape[0]
         self._linear, self._cones = 2 * size + held, list[Any]()
         if not manhattan:
             longer, bound, cones = Lengths(moved, np.zeros(size), n, steps.metric).cones(
@@ -110,7 +111,9 @@ class _Program:
         link, wide = self._of.of(tube)
         tied = 0 if tube.tied is None else len(tube.tied[1])
         cones = [NonnegativeConeT(self._linear + tied), *self._cones]
-        rows, right = sparse.vstack([link, self._rows]), np.concatenate([wide, self._right])
+        bend, change = self._of.bend, tube.bent(self._of.steps, self.spans).ravel()
+        rows = sparse.vstack([link, bend, -bend, self._rows])
+        right = np.concatenate([wide, change, change, self._right])
         found = minimise(self._cost, rows, right, cones, threads=1)
         if not np.isfinite(found.dual).all():
             return None
@@ -265,7 +268,7 @@ class Tubes:
             return
         q, u = motion
         cost = float(self._steps.distance(u).sum())
-        if cost >= self._tried or limit_share(u, self._program.spans, self._steps) > NEARLY:
+        if cost >= self._tried or limit_share(q, u, self._program.spans, self._steps) > NEARLY:
             return
         course = np.concatenate([q[:1], q[0] + np.cumsum(u, axis=0)])
         reached_cost = self._cheaper(Course(gamma, course, np.full(len(q), posture)))

@@ -54,16 +54,17 @@ def _unused(
 def cross_on(
     cells: Cells, step: Step, bend: Bend, lead: Ints, first: int, last: int,
     begin: Ints, to: Ints, origin: Ints, sorted_in: Ints, in_begin: Ints,
-    cost: Array, rest: Array, most: float, nu: Array, price: float, out_behind: Array,
+    cost: Array, rest: Array, most: float, nu: Array, price: Array, out_behind: Array,
 ) -> int:  # fmt: skip
     """Fill the least cost up to the end of each step from cells first..last-1; count the tests.
 
     The steps that end in cell b are sorted_in[in_begin[b - first]..], cheapest first by their
     ``out_behind`` (E,), which is already filled. Steps whose cost with the ``rest`` (C,) exceeds
-    ``most`` get infinity. ``nu`` (n,) are the multipliers of (6) at this layer, and ``price`` is
-    the most that they add; what a pair of steps leaves of it unused is added to its cost.
+    ``most`` get infinity. ``nu`` (n,) are the multipliers of (6) at this layer, and ``price``
+    (C,) is the most that they add in a cell; what a pair of steps leaves of it unused is added to
+    its cost.
     """
-    D, tests = np.empty((2, len(bend.bound))), 0
+    D, tests = np.empty((2, len(nu))), 0
     for b in range(first, last):
         for e in range(begin[b], begin[b + 1]):
             out_behind[e] = np.inf
@@ -74,7 +75,7 @@ def cross_on(
                     break
                 tests += 1
                 if bent_by(cells, step, bend, lead, origin[i], b, to[e], D) < 0:
-                    total += _unused(cells, bend, nu, price, origin[i], b, to[e], D)
+                    total += _unused(cells, bend, nu, price[b], origin[i], b, to[e], D)
                     out_behind[e] = min(out_behind[e], total)
             if not out_behind[e] + rest[to[e]] <= most:
                 out_behind[e] = np.inf
@@ -85,7 +86,7 @@ def cross_on(
 def cross_back(
     cells: Cells, step: Step, bend: Bend, lead: Ints, first: int, last: int,
     to: Ints, origin: Ints, sorted_on: Ints, on_begin: Ints, steps_in: Ints,
-    cost: Array, behind: Array, most: float, nu: Array, price: float, out_ahead: Array,
+    cost: Array, behind: Array, most: float, nu: Array, price: Array, out_ahead: Array,
 ) -> int:  # fmt: skip
     """Fill the least cost from the end of each of the ``steps_in`` on; count the tests.
 
@@ -93,7 +94,7 @@ def cross_back(
     of cost and ``out_ahead`` (E,), which is already filled for them. ``nu`` and ``price`` are as in
     `cross_on`.
     """
-    D, tests = np.empty((2, len(bend.bound))), 0
+    D, tests = np.empty((2, len(nu))), 0
     for i in steps_in:
         b = to[i]
         out_ahead[i] = np.inf

@@ -30,6 +30,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.kernels.jit import jit, jit_inline
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import extend, finish, increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 
@@ -46,12 +47,12 @@ __all__ = [
 
 
 class Bend(NamedTuple):
-    """Limit (6) of two steps: the most by which their mean increments differ.
+    """Two steps to which (6) applies: how many intervals their middles are ``apart``.
 
-    ``bound`` is (n,); ``one`` and ``two`` are 1 by the number of intervals of each step.
+    ``one`` and ``two`` are 1 by the number of intervals of each step.
     """
 
-    bound: Array
+    apart: float
     one: float
     two: float
 
@@ -122,14 +123,15 @@ def bent_by(
 
     ``D`` (2, n) is scratch for the bends and for whether their direction is certain.
     """
-    bound, one, two = bend
-    n, both = len(bound), one + two
+    apart, one, two = bend
+    n, both, at = D.shape[1], one + two, min(b, len(cells.change) - 1)
     for i in range(n):
         d, first = _increment(cells, step, a, b, i)
         e, second = _increment(cells, step, b, c, i)
         d, e = d * one, e * two
         D[0, i], D[1, i] = e - d, 1.0 if first and second else 0.0
-        wide = bound[i] + one * cells.box[a, i] + both * cells.box[b, i] + two * cells.box[c, i]
+        bound = cells.change[at, i] * apart + 2 * LIMIT_TOLERANCE
+        wide = bound + one * cells.box[a, i] + both * cells.box[b, i] + two * cells.box[c, i]
         if first and second and abs(e - d) > wide + SLACK * (abs(d) + abs(e) + wide):
             return i
     r = lead[b]
@@ -138,7 +140,9 @@ def bent_by(
     for i in range(n):
         f = _factor(cells, b, i, r)
         if f != 0.0 and D[1, i] > 0.0:
-            wide = bound[i] + abs(f) * bound[r] + one * _wide(cells, a, i, r, f)
+            wide = cells.change[at, i] * apart + 2 * LIMIT_TOLERANCE
+            wide += abs(f) * (cells.change[at, r] * apart + 2 * LIMIT_TOLERANCE)
+            wide += one * _wide(cells, a, i, r, f)
             wide += both * _wide(cells, b, i, r, f) + two * _wide(cells, c, i, r, f)
             size = abs(D[0, i]) + abs(f * D[0, r]) + wide
             if abs(D[0, i] - f * D[0, r]) > wide + SLACK * size:
@@ -189,7 +193,7 @@ def keep_on(
     layer k + 1.
     """
     first, second, tests = cells.start[k], cells.start[k + 1], 0
-    D, missing = np.empty((2, len(bend.bound))), np.diff(begin_on)
+    D, missing = np.empty((2, cells.center.shape[1])), np.diff(begin_on)
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             b = to[p]
@@ -211,7 +215,7 @@ def keep_back(
 ) -> int:  # fmt: skip
     """Drop the steps from layer k that break (6) with every kept step on; count the tests."""
     first, second, tests = cells.start[k], cells.start[k + 1], 0
-    D = np.empty((2, len(bend.bound)))
+    D = np.empty((2, cells.center.shape[1]))
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             if not out_kept[p]:
@@ -251,7 +255,7 @@ def blame_bends(
 ) -> None:  # fmt: skip
     """Count, by joint, the pairs of steps over layer k + 1 that break (6)."""
     first, second = cells.start[k], cells.start[k + 1]
-    D = np.empty((2, len(bend.bound)))
+    D = np.empty((2, cells.center.shape[1]))
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             if kept[p]:

@@ -13,7 +13,10 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.kernels.jit import jit, jit_inline
 
-__all__ = ["NO_TABLE", "ChangeTable", "change_factors", "fill_change"]
+__all__ = ["NO_TABLE", "ChangeTable", "change_factors", "fill_change", "most_factors"]
+
+ROUNDED = 1e-12
+"""Allowance for rounding, as a share."""
 
 
 class ChangeTable(NamedTuple):
@@ -84,3 +87,48 @@ def change_factors(table: ChangeTable, q: Array) -> Array:
     n = q.shape[-1]
     _fill_factors(table, freeze(q.reshape(-1, n).copy()), freeze(np.ones(n)), out.reshape(-1, n))
     return out
+
+
+@jit
+def _fill_most(table: ChangeTable, low: Array, high: Array, ones: Array, out: Array) -> None:
+    a, b = len(table.joint_2) - 1, len(table.joint_3) - 1
+    value = np.empty(len(ones))
+    for c in range(len(low)):
+        out[c] = 1.0
+        first, last = max(low[c, 1], table.joint_2[0]), min(high[c, 1], table.joint_2[a])
+        left, right = max(low[c, 2], table.joint_3[0]), min(high[c, 2], table.joint_3[b])
+        if not (first <= last and left <= right):
+            continue  # outside the table
+        p, x = _cell(table.joint_2, first), first
+        while True:
+            r, y = _cell(table.joint_3, left), left
+            while True:
+                fill_change(table, x, y, ones, value)
+                for i in range(len(ones)):
+                    out[c, i] = max(out[c, i], value[i])
+                if y >= right:
+                    break
+                r += 1
+                y = min(table.joint_3[r], right)
+            if x >= last:
+                break
+            p += 1
+            x = min(table.joint_2[p], last)
+
+
+def most_factors(table: ChangeTable, low: Array, high: Array) -> Array:
+    """Return the largest factors (C, n) on bound (6) over boxes of the joints, rounded up.
+
+    A bilinear function is largest at a corner: of the box, or where lines of the table cross it.
+
+    Parameters
+    ----------
+    table : ChangeTable
+        With nodes.
+    low, high : (C, n) rad
+    """
+    n = low.shape[1]
+    out = np.empty((len(low), n))
+    ends = np.ascontiguousarray(low), np.ascontiguousarray(high)
+    _fill_most(table, *ends, freeze(np.ones(n)), out)
+    return np.asarray(np.minimum(out * (1 + ROUNDED), table.factor.max(axis=(0, 1))))

@@ -53,6 +53,8 @@ class Cells(NamedTuple):
     ``half`` is (C,) rad; ``widest`` (K,) is the largest box of the joint ``key`` in each layer.
     ``tied`` (C, M, n) are the slopes of the joints by M further parameters, whose sizes are at most
     ``reach`` (C, M). ``middle`` and ``room`` (n, C) are ``center`` and ``box`` joint by joint.
+    ``change`` (C, n) rad is the largest change of an increment from node to node that (6) allows
+    about each cell; (1, n) where it is the same everywhere.
     """
 
     start: Ints
@@ -68,6 +70,7 @@ class Cells(NamedTuple):
     reach: Array
     middle: Array
     room: Array
+    change: Array
 
 
 class Potential(NamedTuple):

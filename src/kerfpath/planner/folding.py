@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath.acceleration_table import OVER
 from kerfpath.arrays import Bools
 from kerfpath.certifier import foldable
 from kerfpath.kernels.turns import EDGE
@@ -32,8 +31,7 @@ def folds(robot: Robot, options: PlanOptions, dt: float) -> Bools:
     """Return which joints (n,) a search may fold, for nodes `dt` s apart.
 
     None are if turns have a price or a limit of their own, and for the methods of the paper. A
-    joint that keeps a margin to a singularity stays on its side of it, so it is not folded, nor is
-    one over which accelerations have a table.
+    joint that keeps a margin to a singularity stays on its side of it, so it is not folded.
     """
     limits, comfort = robot.joint_limits(), options.comfort
     priced = comfort is not None and comfort.limits is not None and comfort.limits.cost > 0
@@ -45,8 +43,6 @@ def folds(robot: Robot, options: PlanOptions, dt: float) -> Bools:
     if comfort is not None:
         joints[comfort.bent(robot)] = False
     joints[(limits.rows != 0).any(axis=0)] = False
-    if robot.limits.acceleration_table is not None:
-        joints[list(OVER)] = False
     return joints
 
 
