@@ -127,7 +127,7 @@ def test_what_is_told_comes_before_what_is_found(home):
     assert find(variables=variables, preference=str(home / "env")) == [preferred, *python]
     Path(local).unlink()
     assert find(variables={}, own=str(home / "own")) == [own, *python]
-    with pytest.raises(process.ProcessError, match="run `kerfpath freecad`"):
+    with pytest.raises(process.NotFound, match="run `kerfpath freecad`"):
         find(variables={}, own=str(home / "no environment"), written=str(home / "python.txt"))
 
 

@@ -12,18 +12,33 @@ from xml.etree import ElementTree
 FOLDER = Path(__file__).parents[2] / "src/kerfpath/freecad/kerfpath_wb/freecad/kerfpath_wb"
 TEMPLATE = FOLDER / "translations" / "kerfpath.ts"
 SHOWN = {
-    "PickError", "ProcessError", "QLabel", "QPushButton", "_say", "addButton", "addTab",
+    "NotFound", "PickError", "ProcessError", "QLabel", "QPushButton", "_say", "addButton", "addTab",
     "openTransaction", "setText", "setToolTip", "setWindowTitle", "tell",
 }  # fmt: skip
 """Calls whose first or second argument a user reads."""
 
 
-def calls():
+def modules():
     for path in sorted(FOLDER.glob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call):
-                name = getattr(node.func, "attr", None) or getattr(node.func, "id", "")
-                yield f"{path.name}:{node.lineno}", name, node.args
+        yield path.name, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def calls(module):
+    name, tree = module
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", None) or getattr(node.func, "id", "")
+            yield f"{name}:{node.lineno}", called, node.args
+
+
+def words(module):
+    """Yield the texts of a module that are translated."""
+    for _, called, args in calls(module):
+        if called == "tr" and isinstance(args[0], ast.Constant):
+            yield args[0].value
+    for node in ast.walk(module[1]):
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") in ("MENU", "TIP"):
+            yield node.value.value  # FreeCAD asks for it, and then it is translated
 
 
 def template():
@@ -31,12 +46,8 @@ def template():
     root = ElementTree.Element("TS", version="2.1", sourcelanguage="en")
     context = ElementTree.SubElement(root, "context")
     ElementTree.SubElement(context, "name").text = "kerfpath"
-    texts = {
-        args[1].value: None
-        for _, name, args in calls()
-        if name in ("translate", "QT_TRANSLATE_NOOP") and isinstance(args[1], ast.Constant)
-    }
-    for text in texts:
+    texts = [text for module in modules() for text in words(module)]
+    for text in dict.fromkeys(texts):
         message = ElementTree.SubElement(context, "message")
         ElementTree.SubElement(message, "source").text = text
         ElementTree.SubElement(message, "translation", type="unfinished")
@@ -55,7 +66,13 @@ def literal(node):
 
 
 def test_what_a_user_reads_can_be_translated():
-    fixed = [(at, literal(a)) for at, name, args in calls() if name in SHOWN for a in args[:2]]
+    fixed = [
+        (at, literal(a))
+        for module in modules()
+        for at, name, args in calls(module)
+        if name in SHOWN
+        for a in args[:2]
+    ]
     # Units are the same in all languages.
     assert [each for each in fixed if each[1] not in ("", "s")] == []
 

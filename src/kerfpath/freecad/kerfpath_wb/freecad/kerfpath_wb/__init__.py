@@ -8,13 +8,7 @@ import os
 try:
     from FreeCAD import Qt
 except ImportError:  # outside FreeCAD texts are as they are
-
-    def translate(context, text):
-        return text
-
-    QT_TRANSLATE_NOOP = translate
-else:
-    translate, QT_TRANSLATE_NOOP = Qt.translate, Qt.QT_TRANSLATE_NOOP
+    Qt = None
 
 VERSION = "0.1.0"
 """Of this workbench and of the kerfpath that it speaks to; also in package.xml."""
@@ -27,3 +21,8 @@ WRITTEN = os.path.join(os.path.dirname(os.path.dirname(HERE)), "python.txt")
 def icon(name):
     """Return the path of an icon."""
     return os.path.join(HERE, "icons", name + ".svg")
+
+
+def tr(text):
+    """Return a text in the language of FreeCAD."""
+    return text if Qt is None else Qt.translate("kerfpath", text)

@@ -12,17 +12,7 @@ try:
 except ImportError:  # FreeCAD 0.20 and 0.21 have them all in QtGui
     QtWidgets = QtGui
 
-from . import (
-    QT_TRANSLATE_NOOP,
-    VERSION,
-    geometry,
-    icon,
-    objects,
-    panel,
-    process,
-    session,
-    translate,
-)  # fmt: skip
+from . import VERSION, geometry, icon, objects, panel, process, session, tr
 
 TOOLBAR = [
     "Kerfpath_Cut",
@@ -44,15 +34,13 @@ def tell(text, install=False):
     """Show a message, which may offer to install kerfpath; it does not wait for an answer."""
     App.Console.PrintWarning("kerfpath: {}\n".format(text))
     box = QtWidgets.QMessageBox(Gui.getMainWindow())
-    box.setWindowTitle(translate("kerfpath", "Kerfpath"))
+    box.setWindowTitle(tr("Kerfpath"))
     box.setText(text)
     box.setModal(False)
     box.setAttribute(QtCore.Qt.WA_DeleteOnClose)
     box.addButton(QtWidgets.QMessageBox.Close)
     if install:
-        button = box.addButton(
-            translate("kerfpath", "Install kerfpath"), QtWidgets.QMessageBox.AcceptRole
-        )
+        button = box.addButton(tr("Install kerfpath"), QtWidgets.QMessageBox.AcceptRole)
         button.clicked.connect(install_kerfpath)
     boxes[:] = [box]
     box.show()
@@ -69,9 +57,7 @@ class _Installation(QtCore.QObject):
 
     def __init__(self):
         super().__init__()
-        self.done.connect(
-            lambda said: tell(said or translate("kerfpath", "kerfpath is installed; go on"))
-        )
+        self.done.connect(lambda said: tell(said or tr("kerfpath is installed; go on")))
         threading.Thread(target=self._work, daemon=True).start()
 
     def _work(self):
@@ -86,12 +72,7 @@ class _Installation(QtCore.QObject):
 def install_kerfpath():
     """Install kerfpath in an environment of the workbench, which takes some minutes."""
     global installation
-    tell(
-        translate(
-            "kerfpath",
-            "Installing kerfpath; this takes some minutes. A message says when it is done.",
-        )
-    )
+    tell(tr("Installing kerfpath; this takes some minutes. A message says when it is done."))
     installation = _Installation()
 
 
@@ -122,13 +103,11 @@ def picked():
         picks += names
     if not found:
         raise geometry.PickError(
-            translate("kerfpath", "nothing to cut is picked: pick edges or faces of the part first")
+            tr("nothing to cut is picked: pick edges or faces of the part first")
         )
     if len(found) > 1:
         labels = " and ".join(each.Label for each in found)
-        raise geometry.PickError(
-            translate("kerfpath", "edges of one part are cut at a time, got those of ") + labels
-        )
+        raise geometry.PickError(tr("edges of one part are cut at a time, got those of ") + labels)
     return found[0], picks
 
 
@@ -168,7 +147,7 @@ def _at_work(document, part):
     try:
         found = session.session_of(document, part)
     except process.ProcessError as error:
-        tell(str(error), install="not found" in str(error))
+        tell(str(error), install=isinstance(error, process.NotFound))
         return None
     panel.show(found)
     return found
@@ -186,8 +165,8 @@ class _Command:
     def GetResources(self):
         return {
             "Pixmap": icon(self.NAME),
-            "MenuText": translate("kerfpath", self.MENU),
-            "ToolTip": translate("kerfpath", self.TIP),
+            "MenuText": tr(self.MENU),
+            "ToolTip": tr(self.TIP),
             "Accel": self.KEYS,
         }
 
@@ -205,10 +184,8 @@ class Cut(_Command):
     """Contours of what is picked."""
 
     NAME, KEYS = "contour", "K, C"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Cut what is picked")
-    TIP = QT_TRANSLATE_NOOP(
-        "kerfpath", "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
-    )
+    MENU = "Cut what is picked"
+    TIP = "Cut the loops of the picked edges or faces: plans at once, and shows the panel"
 
     def run(self):
         part, names = picked()
@@ -220,10 +197,9 @@ class Cut(_Command):
         job = session.job_of(part.Document)
         if job is not None and job.Part != part:
             raise geometry.PickError(
-                translate(
-                    "kerfpath",
+                tr(
                     "the job of this document cuts {}, picked is {}; pick an edge of the first, or "
-                    "delete the job",
+                    "delete the job"
                 ).format(job.Part.Label, part.Label)
             )
         Gui.Selection.clearSelection()
@@ -237,11 +213,8 @@ class Line(Cut):
     """Open lines of the picked edges."""
 
     NAME, KEYS = "line", "K, L"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Cut these edges only")
-    TIP = QT_TRANSLATE_NOOP(
-        "kerfpath",
-        "Cut the picked edges from end to end; a face that is picked, too, says from which side",
-    )
+    MENU = "Cut these edges only"
+    TIP = "Cut the picked edges from end to end; a face that is picked, too, says from which side"
 
     def run(self):
         part, names = picked()
@@ -253,8 +226,8 @@ class Remove(_Command):
     """Contours taken out of the job."""
 
     NAME, KEYS = "remove", "K, R"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Do not cut")
-    TIP = QT_TRANSLATE_NOOP("kerfpath", "Take the selected contours out of the job")
+    MENU = "Do not cut"
+    TIP = "Take the selected contours out of the job"
 
     def IsActive(self):
         return bool(App.ActiveDocument and contours_picked())
@@ -274,11 +247,8 @@ class Fixture(_JobCommand):
     """What the robot keeps clear of."""
 
     NAME, KEYS = "fixture", "K, F"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Keep clear of it")
-    TIP = QT_TRANSLATE_NOOP(
-        "kerfpath",
-        "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions",
-    )
+    MENU = "Keep clear of it"
+    TIP = "The selected solids become fixtures, or no fixtures any more: the plan avoids collisions"
 
     def run(self):
         job = session.job_of(App.ActiveDocument)
@@ -287,12 +257,10 @@ class Fixture(_JobCommand):
             if hasattr(each, "Shape") and each.Shape.Solids and each != job.Part
         ]  # fmt: skip
         if not chosen:
-            raise geometry.PickError(
-                translate("kerfpath", "select solids other than the part first")
-            )
+            raise geometry.PickError(tr("select solids other than the part first"))
         left = [each for each in job.Fixtures if each not in chosen]
         new = [each for each in chosen if each not in job.Fixtures]
-        job.Document.openTransaction(translate("kerfpath", "Kerfpath: Fixtures"))
+        job.Document.openTransaction(tr("Kerfpath: Fixtures"))
         job.Fixtures = left + new
         job.Document.commitTransaction()
         _at_work(job.Document, job.Part)
@@ -302,8 +270,8 @@ class Plan(_JobCommand):
     """The panel of the job."""
 
     NAME, KEYS = "kerfpath", "K, P"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Plan and play")
-    TIP = QT_TRANSLATE_NOOP("kerfpath", "Show the panel of the job: plan, play, settings, program")
+    MENU = "Plan and play"
+    TIP = "Show the panel of the job: plan, play, settings, program"
 
     def run(self):
         open_panel(session.job_of(App.ActiveDocument))
@@ -313,8 +281,8 @@ class Program(_Command):
     """The program, written."""
 
     NAME, KEYS = "program", "K, W"
-    MENU = QT_TRANSLATE_NOOP("kerfpath", "Write the program")
-    TIP = QT_TRANSLATE_NOOP("kerfpath", "Write the audited program, the job and the drawing")
+    MENU = "Write the program"
+    TIP = "Write the audited program, the job and the drawing"
 
     def IsActive(self):
         found = session.running(App.ActiveDocument) if App.ActiveDocument else None

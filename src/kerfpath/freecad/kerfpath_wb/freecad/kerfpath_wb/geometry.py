@@ -5,7 +5,7 @@ Lengths are in mm. Nothing here needs FreeCAD; edges are its edges, or anything 
 
 import math
 
-from . import translate
+from . import tr
 
 NEAR = 1e-3
 """mm: places and lengths this near are the same, for `same`; beside a millionth of the length."""
@@ -89,22 +89,11 @@ def found_again(names, prints, edges):
         alike = [i for i, each in enumerate(now) if same(before, each)]
         if len(alike) != 1:
             gone = index < 0 or index >= len(now)
-            other = (
-                translate("kerfpath", "it is gone")
-                if gone
-                else translate("kerfpath", "it is now a {}").format(said(now[index]))
-            )
-            many = (
-                translate("kerfpath", "several edges are as it was")
-                if alike
-                else translate("kerfpath", "no edge is as it was")
-            )
+            other = tr("it is gone") if gone else tr("it is now a {}").format(said(now[index]))
+            many = tr("several edges are as it was") if alike else tr("no edge is as it was")
             raise PickError(
-                translate(
-                    "kerfpath",
-                    "the model has changed: {} was a {}, {}, and {}; pick the contour again",
-                ).format(
-                    name, said(before), other if gone else other.format(said(now[index])), many
+                tr("the model has changed: {} was a {}, {}, and {}; pick the contour again").format(
+                    name, said(before), other, many
                 )
             )
         found.append("Edge{}".format(alike[0] + 1))
@@ -141,16 +130,14 @@ def chains(names, ends):
             if len(at(point, every)) > 2:
                 beside = sorted({names[k] for k, _ in at(point, every)})
                 raise PickError(
-                    translate("kerfpath", "{} meet at one point; cut one line at a time").format(
-                        ", ".join(beside)
-                    )
+                    tr("{} meet at one point; cut one line at a time").format(", ".join(beside))
                 )
     found, left = [], list(every)
     while left:
         free = [(i, bool(end)) for i in left for end in (0, 1) if len(at(ends[i][end], every)) == 1]
         if not free:
             raise PickError(
-                translate("kerfpath", "{} are a whole loop; take Cut what is picked").format(
+                tr("{} are a whole loop; take Cut what is picked").format(
                     ", ".join(names[i] for i in left)
                 )
             )
@@ -249,9 +236,8 @@ def edges_on(loop, edges):
     length = sum(edge.Length for edge in on.values())
     if length < WHOLE * loop.length:
         raise PickError(
-            translate(
-                "kerfpath",
-                "only {:.4g} of the {:.4g} mm of loop {} are edges of the model; pick another one",
+            tr(
+                "only {:.4g} of the {:.4g} mm of loop {} are edges of the model; pick another one"
             ).format(length, loop.length, loop.name)
         )
     return ["Edge{}".format(i + 1) for i in on]
@@ -280,10 +266,9 @@ def loops_of(groups, loops):
             found.append([loop for loop in loops if all(map(loop.has, points))])
         if not any(found):
             raise PickError(
-                translate(
-                    "kerfpath",
+                tr(
                     "{} is on no loop that can be cut from outside; pick an edge of the outer side "
-                    "of the part",
+                    "of the part"
                 ).format(name)
             )
         on.update(((name, i), each) for i, each in enumerate(found) if each)
@@ -297,10 +282,9 @@ def loops_of(groups, loops):
         likely = [loop for loop in candidates if rank(loop) == best]
         if len(likely) > 1:
             raise PickError(
-                translate(
-                    "kerfpath",
+                tr(
                     "{} is on {}; pick the face whose edge is to be cut, or another edge of the "
-                    "loop, too",
+                    "loop, too"
                 ).format(name, " and on ".join(sorted(loop.name for loop in likely)))
             )
         picked[likely[0].name] = likely[0]

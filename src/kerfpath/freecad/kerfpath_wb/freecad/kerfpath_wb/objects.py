@@ -8,7 +8,7 @@ import json
 import FreeCAD as App
 import Part
 
-from . import geometry, icon, translate
+from . import geometry, icon, tr
 
 SCALE = 1000.0
 """mm in a metre."""
@@ -215,9 +215,7 @@ def lines_in(source, names):
     edges = [name for name in names if name.startswith("Edge")]
     sides = [shape.Faces[int(name[4:]) - 1] for name in names if name.startswith("Face")]
     if not edges:
-        raise geometry.PickError(
-            translate("kerfpath", "no edge is picked: pick the edges of the line first")
-        )
+        raise geometry.PickError(tr("no edge is picked: pick the edges of the line first"))
     every = [shape.Edges[int(name[4:]) - 1] for name in edges]
     found = []
     for line in geometry.chains(edges, [_ends(edge) for edge in every]):
@@ -227,10 +225,9 @@ def lines_in(source, names):
         chosen = [[f for f in each if _among(f, common)] for each in beside]
         if any(len(each) != 1 for each in chosen) or not (sides or len(common) == 1):
             raise geometry.PickError(
-                translate(
-                    "kerfpath",
+                tr(
                     "{}: its side is not clear; pick the face from whose side it is cut, too, with "
-                    "Control held",
+                    "Control held"
                 ).format(", ".join(edges[i] for i, _ in line))
             )
         normals = [
@@ -258,10 +255,9 @@ def line_of(shape, names, normals):
         alike = [face for face in beside if _normal(face, middle).dot(normal) > SQUARE]
         if len(alike) != 1:
             raise geometry.PickError(
-                translate(
-                    "kerfpath",
+                tr(
                     "the model has changed: the face on whose side {} is cut is another one; pick "
-                    "the line again",
+                    "the line again"
                 ).format(names[i])
             )
         points = _points(edge)

@@ -15,7 +15,7 @@ try:
 except ImportError:  # FreeCAD 0.20 and 0.21 have them all in QtGui
     QtWidgets = QtGui
 
-from . import objects, translate
+from . import objects, tr
 from .process import ProcessError
 
 GOOD, BAD, WAIT = "#2e7d32", "#c62828", "#8a6d00"
@@ -33,10 +33,7 @@ class PoseMap(QtWidgets.QWidget):
         super().__init__()
         self.setMinimumHeight(MAP_HEIGHT)
         self.setToolTip(
-            translate(
-                "kerfpath",
-                "Rotations about the beam along the cut: why they are lost, and the chosen one",
-            )
+            tr("Rotations about the beam along the cut: why they are lost, and the chosen one")
         )
         self._image, self._course, self._nodes, self._gamma, self._node = None, [], 0, [], None
         self.codes = b""
@@ -235,12 +232,12 @@ class Panel:
     def __init__(self, session):
         self.session, self._layers = session, None
         self.form = QtWidgets.QWidget()
-        self.form.setWindowTitle(translate("kerfpath", "Kerfpath"))
+        self.form.setWindowTitle(tr("Kerfpath"))
         self.form.setWindowIcon(QtGui.QIcon(objects.icon("kerfpath")))
         tabs = QtWidgets.QTabWidget()
         self.settings = Settings(session)
-        tabs.addTab(self._cut_tab(), translate("kerfpath", "Cut"))
-        tabs.addTab(self.settings, translate("kerfpath", "All settings"))
+        tabs.addTab(self._cut_tab(), tr("Cut"))
+        tabs.addTab(self.settings, tr("All settings"))
         outer = QtWidgets.QVBoxLayout(self.form)
         outer.setContentsMargins(0, 0, 0, 0)
         outer.addWidget(tabs)
@@ -285,7 +282,7 @@ class Panel:
         self.status.setWordWrap(True)
         self.bar.setTextVisible(False)
         self.bar.setMaximumHeight(8)
-        self.stop = QtWidgets.QPushButton(translate("kerfpath", "Stop"))
+        self.stop = QtWidgets.QPushButton(tr("Stop"))
         self.stop.clicked.connect(self._stop_or_plan)
         line = QtWidgets.QHBoxLayout()
         line.addWidget(self.status, 1)
@@ -298,7 +295,7 @@ class Panel:
         rows.addWidget(self.verdict)
         self.remedies = QtWidgets.QLabel()
         self.remedies.setWordWrap(True)
-        self.remedies.setToolTip(translate("kerfpath", "Change the job so that there is a path"))
+        self.remedies.setToolTip(tr("Change the job so that there is a path"))
         self.remedies.linkActivated.connect(lambda number: self._offers[int(number)][1]())
         rows.addWidget(self.remedies)
         form = QtWidgets.QFormLayout()
@@ -316,10 +313,10 @@ class Panel:
         self.head.activated.connect(self._mount)
         self.language.activated.connect(self._speak)
         for label, control in (
-            (translate("kerfpath", "Speed"), self.speed),
-            (translate("kerfpath", "Robot"), self.robot),
-            (translate("kerfpath", "Head"), self.head),
-            (translate("kerfpath", "Language"), self.language),
+            (tr("Speed"), self.speed),
+            (tr("Robot"), self.robot),
+            (tr("Head"), self.head),
+            (tr("Language"), self.language),
         ):
             form.addRow(label, control)
         rows.addLayout(form)
@@ -336,10 +333,7 @@ class Panel:
         self.legend = QtWidgets.QLabel()
         self.legend.setWordWrap(True)
         rows.addWidget(self.legend)
-        self.play, self.time = (
-            QtWidgets.QPushButton(translate("kerfpath", "Play")),
-            QtWidgets.QLabel(),
-        )
+        self.play, self.time = QtWidgets.QPushButton(tr("Play")), QtWidgets.QLabel()
         self.slider = QtWidgets.QSlider(QtCore.Qt.Horizontal)
         self.slider.setRange(0, STEPS)
         self.slider.sliderMoved.connect(
@@ -350,10 +344,10 @@ class Panel:
         for control, share in ((self.play, 0), (self.slider, 1), (self.time, 0)):
             line.addWidget(control, share)
         rows.addLayout(line)
-        self.write = QtWidgets.QPushButton(translate("kerfpath", "Write the program"))
+        self.write = QtWidgets.QPushButton(tr("Write the program"))
         self.folder = QtWidgets.QPushButton("…")
         self.folder.setMaximumWidth(32)
-        self.folder.setToolTip(translate("kerfpath", "Choose the folder of the program"))
+        self.folder.setToolTip(tr("Choose the folder of the program"))
         self.write.clicked.connect(self._write)
         self.folder.clicked.connect(self._choose_folder)
         line = QtWidgets.QHBoxLayout()
@@ -383,22 +377,18 @@ class Panel:
         tables = (self.session.values or {}).get("contour", [])
         self.session.problem = ""
         self.session.edit(
-            translate("kerfpath", "Speed"),
+            tr("Speed"),
             [(["contour", i, "speed_m_min"], round(value, 4)) for i in range(len(tables))],
         )
 
     def _mount(self, at):
         own = [key for key in ("tool.xyz_mm", "tool.rpy_deg") if key in self.session.given]
         changes = [(key.split("."), None) for key in own]
-        self.session.edit(
-            translate("kerfpath", "Head"), [*changes, (["tool", "head"], self.head.itemText(at))]
-        )
+        self.session.edit(tr("Head"), [*changes, (["tool", "head"], self.head.itemText(at))])
 
     def _speak(self, at):
         changes = self.session.language_changes(self.language.itemText(at))
-        self.session.edit(
-            translate("kerfpath", "Language"), [(key.split("."), to) for key, to in changes.items()]
-        )
+        self.session.edit(tr("Language"), [(key.split("."), to) for key, to in changes.items()])
 
     def _choose(self, at):
         self.session.ask("focus", contour=self.contour.currentText())
@@ -420,10 +410,10 @@ class Panel:
 
     def _choose_folder(self):
         folder = QtWidgets.QFileDialog.getExistingDirectory(
-            self.form, translate("kerfpath", "Folder of the program"), self.session.export_folder()
+            self.form, tr("Folder of the program"), self.session.export_folder()
         )
         if folder and self.session.job is not None:
-            self.session.document.openTransaction(translate("kerfpath", "Kerfpath: Folder"))
+            self.session.document.openTransaction(tr("Kerfpath: Folder"))
             self.session.job.Folder = folder
             self.session.document.commitTransaction()
             self.refresh()
@@ -439,9 +429,7 @@ class Panel:
         if kind == "exported":
             names = [name.replace("\\", "/").rsplit("/", 1)[-1] for name in self.session.exported]
             self.written.setText(
-                translate("kerfpath", "Wrote {} to {}").format(
-                    ", ".join(names), self.session.export_folder()
-                )
+                tr("Wrote {} to {}").format(", ".join(names), self.session.export_folder())
             )
         self.refresh()
 
@@ -450,23 +438,10 @@ class Panel:
         session, progress = self.session, self.session.progress
         ended, busy = session.studio is None, progress["busy"] and session.studio is not None
         label = progress["label"] if busy else ""
-        self.status.setText(
-            label
-            or (
-                translate("kerfpath", "kerfpath does not run")
-                if ended
-                else translate("kerfpath", "ready")
-            )
-        )
+        self.status.setText(label or (tr("kerfpath does not run") if ended else tr("ready")))
         self.bar.setRange(0, progress["total"] if busy else 1)  # 0: busy, for an unknown time
         self.bar.setValue(progress["done"] if busy else 1)
-        self.stop.setText(
-            translate("kerfpath", "Start")
-            if ended
-            else translate("kerfpath", "Stop")
-            if busy
-            else translate("kerfpath", "Plan")
-        )
+        self.stop.setText(tr("Start") if ended else tr("Stop") if busy else tr("Plan"))
         text, colour = self._said()
         self.verdict.setText(text)
         self.verdict.setStyleSheet("font-weight: bold; color: {}".format(colour))
@@ -487,9 +462,7 @@ class Panel:
                 self.speed.setValue(min(speeds))
                 self.speed.blockSignals(False)
                 self.speed.setToolTip(
-                    translate("kerfpath", "Of all contours")
-                    if len(speeds) == 1
-                    else translate("kerfpath", "The lowest of the contours")
+                    tr("Of all contours") if len(speeds) == 1 else tr("The lowest of the contours")
                 )
         made = self._export()
         self.write.setEnabled(bool(made and made["ready"]) and not session.lost())
@@ -524,26 +497,19 @@ class Panel:
             return "\n".join(each["statement"] for each in none), BAD
         outcome = session.outcome
         if outcome is None or outcome["revision"] != now:
-            return translate("kerfpath", "No verdict yet"), WAIT
+            return tr("No verdict yet"), WAIT
         if not outcome["passed"]:
-            why = (self._export() or {}).get("why") or translate("kerfpath", "see the audit")
-            return translate("kerfpath", "Not to be cut: {}").format(why), BAD
+            why = (self._export() or {}).get("why") or tr("see the audit")
+            return tr("Not to be cut: {}").format(why), BAD
         plans = [plan for held in session.plans.values() for plan in held.values()]
-        text = translate("kerfpath", "Passed: {} audited").format(
-            "{} {}".format(
-                len(plans),
-                translate("kerfpath", "contour")
-                if len(plans) == 1
-                else translate("kerfpath", "contours"),
-            )
+        text = tr("Passed: {} audited").format(
+            "{} {}".format(len(plans), tr("contour") if len(plans) == 1 else tr("contours"))
         )
         if outcome["cycle"]:
             text += ", {:.1f} s".format(outcome["cycle"]["total"])
         gaps = [plan["gap"] for plan in plans if plan["gap"] is not None]
         if gaps and len(gaps) == len(plans):
-            text += translate("kerfpath", "; at most {:.1f} % above the best motion").format(
-                100 * max(gaps)
-            )
+            text += tr("; at most {:.1f} % above the best motion").format(100 * max(gaps))
         return text, GOOD
 
     def _show_remedies(self, made):
@@ -585,9 +551,7 @@ class Panel:
 
     def _moment(self):
         session, total = self.session, self.session.timeline.total
-        self.play.setText(
-            translate("kerfpath", "Pause") if session.playing else translate("kerfpath", "Play")
-        )
+        self.play.setText(tr("Pause") if session.playing else tr("Play"))
         self.play.setEnabled(total > 0)
         self.slider.setEnabled(total > 0)
         self.time.setText("{:.1f} / {:.1f} s".format(session.t, total))

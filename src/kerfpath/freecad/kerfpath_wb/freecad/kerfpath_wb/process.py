@@ -18,7 +18,7 @@ import threading
 from collections import deque
 from urllib.parse import parse_qs, urlsplit
 
-from . import translate
+from . import tr
 
 FOREIGN = ("PYTHON", "LD_LIBRARY_PATH", "QT_", "SSL_CERT", "FONTCONFIG_")
 """Beginnings of the variables by which FreeCAD would lead another Python astray."""
@@ -36,6 +36,10 @@ OLDEST = (3, 11)
 
 class ProcessError(Exception):
     """kerfpath is not found, does not start, or has ended; the text says what to do."""
+
+
+class NotFound(ProcessError):
+    """kerfpath is in none of the places where it is looked for; it may be installed."""
 
 
 # -----------------------------------------------------------------------------
@@ -62,7 +66,7 @@ def command_of(path):
     if os.path.isdir(path):
         path = os.path.join(path, *PYTHON)
     if not os.path.isfile(path):
-        raise ProcessError(translate("kerfpath", "there is no kerfpath at {}").format(path))
+        raise ProcessError(tr("there is no kerfpath at {}").format(path))
     if os.path.basename(path).lower().startswith("python"):
         return [path, "-I", "-m", "kerfpath"]
     return [path]
@@ -93,18 +97,16 @@ def find(preference="", written="", own="", variables=None):
         with open(written, encoding="utf-8") as file:
             recorded = file.read().strip()
     named = (
-        (preference, "the preference of the workbench names"),
-        (given.get("KERFPATH", ""), "the variable KERFPATH names"),
-        (recorded, "`kerfpath freecad` has written"),
+        (preference, tr("the preference of the workbench names")),
+        (given.get("KERFPATH", ""), tr("the variable KERFPATH names")),
+        (recorded, tr("`kerfpath freecad` has written")),
     )
     for path, who in named:
         if path:
             try:
                 return command_of(path)
             except ProcessError as error:
-                raise ProcessError(
-                    translate("kerfpath", "{}, which {}; correct it").format(error, who)
-                ) from None
+                raise ProcessError(tr("{}, which {}; correct it").format(error, who)) from None
     home = os.path.expanduser("~")
     on_path = shutil.which("kerfpath", path=clean_path(given.get("PATH", "")))
     guesses = [on_path, os.path.join(home, ".local", "bin", "kerfpath")]
@@ -112,11 +114,10 @@ def find(preference="", written="", own="", variables=None):
     for path in filter(None, guesses):
         if os.path.exists(path):
             return command_of(path)
-    raise ProcessError(
-        translate(
-            "kerfpath",
+    raise NotFound(
+        tr(
             "kerfpath is not found on PATH, in ~/.local/bin or in the workbench's own environment; "
-            "install it with the button, or run `kerfpath freecad` in the environment that has it",
+            "install it with the button, or run `kerfpath freecad` in the environment that has it"
         )
     )
 
@@ -148,10 +149,9 @@ def installation(folder, requirement, variables=None):
                 [python, "-I", "-m", "pip", "install", requirement],
             ]
     raise ProcessError(
-        translate(
-            "kerfpath",
+        tr(
             "to install kerfpath, uv or a Python of version {} or newer with venv is needed, and "
-            "none is on PATH; install uv (https://docs.astral.sh/uv) and try again",
+            "none is on PATH; install uv (https://docs.astral.sh/uv) and try again"
         ).format(oldest)
     )
 
@@ -177,7 +177,7 @@ def install(folder, requirement):
             said = " ".join(done.stdout.strip().splitlines()[-3:])
             shutil.rmtree(folder, ignore_errors=True)
             raise ProcessError(
-                translate("kerfpath", "{} has failed: {}").format(
+                tr("{} has failed: {}").format(
                     os.path.basename(command[0]) + " " + command[1], said
                 )
             )
@@ -216,9 +216,7 @@ class Studio:
             )  # fmt: skip
         except OSError as error:
             raise ProcessError(
-                translate("kerfpath", "{} cannot be started ({})").format(
-                    command[0], error.strerror
-                )
+                tr("{} cannot be started ({})").format(command[0], error.strerror)
             ) from None
         self._errors = threading.Thread(target=self._collect, daemon=True)
         self._errors.start()
@@ -259,9 +257,7 @@ class Studio:
         try:
             answer, content = self._request(path, {"Cookie": self._cookie})
         except (OSError, http.client.HTTPException) as error:
-            raise ProcessError(
-                translate("kerfpath", "kerfpath does not answer ({})").format(error)
-            ) from None
+            raise ProcessError(tr("kerfpath does not answer ({})").format(error)) from None
         if answer.status != 200:
             raise ProcessError(content.decode("utf-8", "replace").strip())
         return content
@@ -328,19 +324,18 @@ class Studio:
         if "No such option" in text and "--json" in text:
             return self._other_version("an older version")
         if "No module named kerfpath" in text:
-            return "the Python {} has no kerfpath; install it there".format(self._command[0])
-        said = self._said[-1] if self._said else "it said nothing"
+            return tr("the Python {} has no kerfpath; install it there").format(self._command[0])
+        said = self._said[-1] if self._said else tr("it said nothing")
         for line in self._said:
             if "error:" in line:
                 said = line.partition("error:")[2].strip()
-        return "kerfpath has ended: {}".format(said)
+        return tr("kerfpath has ended: {}").format(said)
 
     def _other_version(self, found):
-        return (
+        return tr(
             "this workbench belongs to kerfpath {}, and {} is {}; run `kerfpath freecad` in the "
-            "environment that you want, which installs its workbench, and start FreeCAD "
-            "again".format(self._version, self._command[0], found)
-        )
+            "environment that you want, which installs its workbench, and start FreeCAD again"
+        ).format(self._version, self._command[0], found)
 
     def _connect(self, started):
         if started["version"] != self._version:
@@ -373,9 +368,7 @@ class Studio:
         expected = base64.b64encode(hashlib.sha1((key + magic).encode()).digest())
         if b" 101 " not in status or accept != expected:
             raise ProcessError(
-                translate("kerfpath", "kerfpath has refused the connection: {}").format(
-                    status.decode()
-                )
+                tr("kerfpath has refused the connection: {}").format(status.decode())
             )
         connection.settimeout(None)
         with self._lock:

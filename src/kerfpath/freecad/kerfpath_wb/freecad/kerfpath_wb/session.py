@@ -16,7 +16,7 @@ from struct import unpack_from
 import FreeCAD as App
 from PySide import QtCore
 
-from . import VERSION, WRITTEN, geometry, motion, objects, translate
+from . import VERSION, WRITTEN, geometry, motion, objects, tr
 from .process import ProcessError, Studio, find
 
 PREFERENCES = "User parameter:BaseApp/Preferences/Mod/Kerfpath"
@@ -121,12 +121,7 @@ class Session(QtCore.QObject):
         self.document, self.job, self.part = document, job, part
         self.values = self.options = self.scene = self.program = self.outcome = None
         self.given, self.faults, self.plans, self.none, self.maps = [], [], {}, {}, {}
-        self.progress = {
-            "busy": True,
-            "label": translate("kerfpath", "starting kerfpath"),
-            "done": 0,
-            "total": 0,
-        }
+        self.progress = {"busy": True, "label": tr("starting kerfpath"), "done": 0, "total": 0}
         self.problem, self.text, self.revision = "", None, 0
         self.t, self.playing, self.timeline = 0.0, False, motion.Timeline(None, [])
         self.moved, self.studio, self._folder = 0.0, None, None
@@ -155,12 +150,7 @@ class Session(QtCore.QObject):
             lines = self._lines_written()
             path = os.path.join(self._folder, self._job_name())
             _write(path, self.job.Job.encode())
-        self.progress = {
-            "busy": True,
-            "label": translate("kerfpath", "starting kerfpath"),
-            "done": 0,
-            "total": 0,
-        }
+        self.progress = {"busy": True, "label": tr("starting kerfpath"), "done": 0, "total": 0}
         try:
             self.studio = Studio(found, path, VERSION)
         except ProcessError:
@@ -230,7 +220,7 @@ class Session(QtCore.QObject):
         self._new_lines = {}
         for names, normals in lines:
             if sorted(names) in cut:
-                self._say(translate("kerfpath", "{} is already cut").format(", ".join(names)))
+                self._say(tr("{} is already cut").format(", ".join(names)))
                 continue
             name = next(n for n in map("line{}".format, range(1, 10**6)) if n not in taken)
             taken.add(name)
@@ -242,20 +232,13 @@ class Session(QtCore.QObject):
         """Take contours out of the job."""
         left = [each.Loop for each in self.job.Contours if each not in contours]
         if not left:
-            self._say(
-                translate(
-                    "kerfpath", "a job needs a contour: pick another one before, or delete the job"
-                )
-            )
+            self._say(tr("a job needs a contour: pick another one before, or delete the job"))
         elif self._loops:
-            self._label = translate("kerfpath", "Remove contours")
+            self._label = tr("Remove contours")
             self.ask("cut", loops=left, alone=True)
         else:
             self._say(
-                translate(
-                    "kerfpath",
-                    "the drawing is not read yet; wait until it is, and remove the contour then",
-                )
+                tr("the drawing is not read yet; wait until it is, and remove the contour then")
             )
 
     def choose_robot(self, robot_id):
@@ -278,7 +261,7 @@ class Session(QtCore.QObject):
         if spoken != "none" and to["languages"] and spoken not in to["languages"]:
             changes.update(self.language_changes(to["languages"][0]))
         self.edit(
-            translate("kerfpath", "Robot {}").format(to["id"]),
+            tr("Robot {}").format(to["id"]),
             [(self.path(key), value) for key, value in changes.items()],
         )
 
@@ -456,7 +439,7 @@ class Session(QtCore.QObject):
         self._resolve()
         lines = set(self._new_lines)
         if lines and lines <= {each["name"] for each in message["loops"]} - self._asked():
-            self._label, self._cut = translate("kerfpath", "Cut"), lines
+            self._label, self._cut = tr("Cut"), lines
             self.ask("cut", loops=sorted(lines), alone=self.job is None)
 
     def _asked(self):
@@ -520,7 +503,7 @@ class Session(QtCore.QObject):
                 _write(os.path.join(folder, name), content)
         except OSError as error:
             raise ProcessError(
-                translate("kerfpath", "{} cannot be written ({}); choose another folder").format(
+                tr("{} cannot be written ({}); choose another folder").format(
                     error.filename or folder, error.strerror
                 )
             ) from None
@@ -545,21 +528,15 @@ class Session(QtCore.QObject):
         cut = {each.Loop for each in self.job.Contours}
         new = [name for name in picked if name not in cut]
         if not new:
-            self._say(
-                translate("kerfpath", "{} is already cut; pick another loop").format(
-                    ", ".join(picked)
-                )
-            )
+            self._say(tr("{} is already cut; pick another loop").format(", ".join(picked)))
             return
-        self._label = translate("kerfpath", "Cut")
+        self._label = tr("Cut")
         self.ask("cut", loops=new)
 
     def _loop(self, name):
         found = next((loop for loop in self._loops if loop.name == name), None)
         if found is None:
-            raise geometry.PickError(
-                translate("kerfpath", "the drawing has no loop {} any more").format(name)
-            )
+            raise geometry.PickError(tr("the drawing has no loop {} any more").format(name))
         return found
 
     def _rename(self):
@@ -582,7 +559,7 @@ class Session(QtCore.QObject):
     def _apply(self):
         """Take the text of the process into the document, with its robot and contours."""
         quiet = self._label in UNNAMED
-        label, self._label = self._label or translate("kerfpath", "Change the job"), ""
+        label, self._label = self._label or tr("Change the job"), ""
         with self._transaction(None if quiet else "Kerfpath: " + label):
             self.job.Job = self.text
             self._place_robot()
@@ -591,7 +568,7 @@ class Session(QtCore.QObject):
 
     def _make(self):
         """Make the objects of a new job, as one step of undo."""
-        with self._transaction(translate("kerfpath", "Kerfpath: Cut")):
+        with self._transaction(tr("Kerfpath: Cut")):
             self.job = objects.make_job(self.document, self.part)
             self.job.Job = self.text
             self._place_robot()

@@ -4,6 +4,42 @@
   <context>
     <name>kerfpath</name>
     <message>
+      <source>Kerfpath</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>Installing kerfpath; this takes some minutes. A message says when it is done.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>Install kerfpath</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>nothing to cut is picked: pick edges or faces of the part first</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>Kerfpath: Fixtures</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>edges of one part are cut at a time, got those of </source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>select solids other than the part first</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>kerfpath is installed; go on</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>the job of this document cuts {}, picked is {}; pick an edge of the first, or delete the job</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <source>Cut what is picked</source>
       <translation type="unfinished" />
     </message>
@@ -49,42 +85,6 @@
     </message>
     <message>
       <source>Write the audited program, the job and the drawing</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>Kerfpath</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>Installing kerfpath; this takes some minutes. A message says when it is done.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>Install kerfpath</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>nothing to cut is picked: pick edges or faces of the part first</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>Kerfpath: Fixtures</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>edges of one part are cut at a time, got those of </source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>select solids other than the part first</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>kerfpath is installed; go on</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <source>the job of this document cuts {}, picked is {}; pick an edge of the first, or delete the job</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -256,11 +256,39 @@
       <translation type="unfinished" />
     </message>
     <message>
+      <source>the preference of the workbench names</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>the variable KERFPATH names</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>`kerfpath freecad` has written</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>it said nothing</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <source>to install kerfpath, uv or a Python of version {} or newer with venv is needed, and none is on PATH; install uv (https://docs.astral.sh/uv) and try again</source>
       <translation type="unfinished" />
     </message>
     <message>
+      <source>kerfpath has ended: {}</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>this workbench belongs to kerfpath {}, and {} is {}; run `kerfpath freecad` in the environment that you want, which installs its workbench, and start FreeCAD again</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
       <source>there is no kerfpath at {}</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <source>the Python {} has no kerfpath; install it there</source>
       <translation type="unfinished" />
     </message>
     <message>
