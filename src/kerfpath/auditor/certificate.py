@@ -430,8 +430,7 @@ def _through(rates: Rates, at: Places, stage: Stage, prices: Array) -> Array:
     kept: list[list[Costs] | None] = []
     for both, places in steps:
         parts: list[Costs] | None = []
-        for a, b, reduced in _costs(rates, places, value[both], dual[both]):
-            cost = reduced + spared[both][a]
+        for a, b, cost in _costs(rates, places, value[both], dual[both], spared[both]):
             np.minimum.at(begun[both], b, begun[both][a] + cost)
             held += len(a)
             if parts is not None:
@@ -440,10 +439,7 @@ def _through(rates: Rates, at: Places, stage: Stage, prices: Array) -> Array:
                 parts = None
         kept.append(parts)
     for (both, places), known in zip(reversed(steps), reversed(kept), strict=True):
-        for a, b, cost in known or (
-            (a, b, reduced + spared[both][a])
-            for a, b, reduced in _costs(rates, places, value[both], dual[both])
-        ):
+        for a, b, cost in known or _costs(rates, places, value[both], dual[both], spared[both]):
             np.minimum.at(ended[both], a, ended[both][b] + cost)
     whole, size = begun + ended, float(price.sum())
     if stage.multipliers is not None:
@@ -453,10 +449,13 @@ def _through(rates: Rates, at: Places, stage: Stage, prices: Array) -> Array:
     return whole - _rounding(rates, at, value, dual, whole) - size
 
 
-def _costs(rates: Rates, at: Places, value: Array, dual: Array) -> Iterator[Costs]:
-    """Yield the steps between the places of two nodes, and lower bounds on their costs."""
+def _costs(rates: Rates, at: Places, value: Array, dual: Array, spared: Array) -> Iterator[Costs]:
+    """Yield the steps between the places of two nodes, and lower bounds on their costs.
+
+    They include what is `spared` (C,) of the prices of the places that they come from.
+    """
     for a, b in candidates(rates, at):
-        cost = reduced_costs(rates, at, value, dual, a, b)
+        cost = reduced_costs(rates, at, value, dual, a, b) + spared[a]
         yield a.astype(np.int32), b.astype(np.int32), cost
 
 

@@ -80,6 +80,9 @@ class Interval:
     def __getitem__(self, index: Any) -> Interval:
         return Interval(self.lo[index], self.hi[index])
 
+    def broadcast_to(self, shape: tuple[int, ...]) -> Interval:
+        return Interval(np.broadcast_to(self.lo, shape), np.broadcast_to(self.hi, shape))
+
     def scaled(self, number: ArrayLike) -> Interval:
         """Return the product with exact numbers."""
         factor = np.asarray(number, dtype=float)
@@ -207,6 +210,17 @@ class Jet:
             self.half,
         )
 
+    def broadcast_to(self, shape: tuple[int, ...]) -> Jet:
+        """Return the functions in a shape; its last axis is that of t."""
+        return Jet(
+            self.at.broadcast_to(shape),
+            self.slope.broadcast_to(shape),
+            self.value.broadcast_to(shape),
+            self.rate.broadcast_to(shape),
+            self.bend.broadcast_to(shape),
+            self.half,
+        )
+
     def __neg__(self) -> Jet:
         return Jet(-self.at, -self.slope, -self.value, -self.rate, -self.bend, self.half)
 
@@ -307,7 +321,7 @@ def constant(number: Interval, like: Jet) -> Jet:
 
 
 def joined(jets: Sequence[Jet], axis: int = 0) -> Jet:
-    """Return jets of the same t as one, along an axis that they have."""
+    """Return jets as one, along an axis that they have; along the last, each has its own t."""
 
     def along(parts: list[Interval]) -> Interval:
         return Interval(
@@ -321,7 +335,7 @@ def joined(jets: Sequence[Jet], axis: int = 0) -> Jet:
         along([jet.value for jet in jets]),
         along([jet.rate for jet in jets]),
         along([jet.bend for jet in jets]),
-        jets[0].half,
+        np.concatenate([jet.half for jet in jets]) if axis == -1 else jets[0].half,
     )
 
 

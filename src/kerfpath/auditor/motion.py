@@ -366,7 +366,10 @@ class _Task:
                 external = [values[i] for i in range(len(self._robot.externals))]
                 parts.append(([*arm, *external], absent))
         none = np.concatenate([np.broadcast_to(n, (2, 2, 2, n.shape[-1])) for _, n in parts], -1)
-        return [_joined(each) for each in zip(*(joints for joints, _ in parts), strict=True)], none
+        if len(parts) == 1:
+            return parts[0][0], none
+        batches = [[q.broadcast_to((2, 2, 2, len(q.half))) for q in joints] for joints, _ in parts]
+        return [joined(each, axis=-1) for each in zip(*batches, strict=True)], none
 
     def _pose(self, k: Ints, time: Jet, values: Jet) -> Pose:
         """Return the pose of the model's end over time, with external axes at values (E, S)."""
@@ -474,20 +477,3 @@ def _terms(largest: float) -> int:
         if 1.5 * n * n * power <= CUT_OFF * factorial(2 * n + 1):
             return n
     return TERMS
-
-
-def _joined(jets: tuple[Jet, ...]) -> Jet:
-    """Return jets of several batches as one, in every posture."""
-    if len(jets) == 1:
-        return jets[0]
-
-    def along(name: str) -> Interval:
-        held = [getattr(each, name) for each in jets]
-        ends = [
-            np.concatenate([np.broadcast_to(e, (2, 2, 2, e.shape[-1])) for e in end], axis=-1)
-            for end in ([h.lo for h in held], [h.hi for h in held])
-        ]
-        return Interval(*ends)
-
-    half = np.concatenate([each.half for each in jets])
-    return Jet(along("at"), along("slope"), along("value"), along("rate"), along("bend"), half)

@@ -502,7 +502,7 @@ class _Certification:
         nodes = np.arange(self.last + 1)
         near = (self._prices(nodes, self.plan.gamma, posture, NARROW, most) for most in DEAREST)
         spans = np.diff(nodes)
-        change = self.steps.changes(self.plan.q, 0.0, spans, nodes)
+        change = self.steps.changes(self.plan.q, 0.0, spans)
         most = max(self.steps.price(prices, spans, change) for prices in near)
         return most > self.cost - self.target
 
@@ -518,7 +518,7 @@ class _Certification:
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
         spans = np.diff(nodes)
-        change = self.steps.changes(q, 0.0, spans, np.arange(len(nodes)))
+        change = self.steps.changes(q, 0.0, spans)
         return limit_prices(u, slope, self.steps, spans, reach, most, change)
 
     def _divide(self, cells: CellSet) -> None:

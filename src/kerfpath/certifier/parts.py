@@ -188,7 +188,7 @@ class Parts:
         if len(spans) + 1 != len(prices):
             return np.inf
         steps = self._steps
-        change = steps.changes(motion.center, motion.box, spans, np.arange(len(prices)))
+        change = steps.changes(motion.center, motion.box, spans)
         return steps.priced(increments(motion.center, steps.endless), prices, spans, change)
 
     def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:

@@ -93,7 +93,9 @@ class Steps:
             everywhere=change.per_interval(dt),
         )
 
-    def changes(self, middle: Array, reach: Array | float, spans: Ints, layer: Ints) -> Array:
+    def changes(
+        self, middle: Array, reach: Array | float, spans: Ints, layer: Ints | None = None
+    ) -> Array:
         """Return bound (6) about boxes, (C, n) rad; (1, n) if it is the same everywhere.
 
         Where the steps to a box and from it span several intervals, it is the mean of the bounds
@@ -105,9 +107,10 @@ class Steps:
             Boxes of the joints, on their turns.
         spans : (M - 1,)
             The intervals between the layers.
-        layer : (C,)
-            That of each box.
+        layer : (C,), optional
+            That of each box. Default: there is one box for each layer, in their order.
         """
+        layer = np.arange(len(middle)) if layer is None else layer
         if self.everywhere is None or not len(self.table.joint_2):
             return self.acceleration[None]
         before, after = np.append(1, spans)[layer], np.append(spans, 1)[layer]
@@ -221,9 +224,8 @@ def cross_bends(
     start, step = packed.start, steps.over(1)
     nu, price = np.zeros((len(start) - 1, len(steps.weight))), np.zeros(len(behind))
     if multipliers is not None:
-        layer = np.repeat(np.arange(len(start) - 1), np.diff(start))
         nu = multipliers
-        price = steps.prices(nu, spans, packed.change, layer) * (1 - ROUNDED)
+        price = steps.prices(nu, spans, packed.change, _layers(packed)) * (1 - ROUNDED)
     lead = np.argmax(np.abs(packed.slope) / steps.acceleration, axis=1)
     bends = [bend_of(*pair) for pair in pairwise(spans.tolist())]
     origin = np.repeat(np.arange(len(behind)), np.diff(begin))
@@ -262,6 +264,11 @@ def cross_bends(
     np.minimum.at(through, origin, whole)
     np.minimum.at(through, to[edges[-1]], until[edges[-1]])
     return through, tests
+
+
+def _layers(packed: Cells) -> Ints:
+    """Return the layer (C,) of each cell."""
+    return np.repeat(np.arange(len(packed.start) - 1), np.diff(packed.start))
 
 
 # -----------------------------------------------------------------------------
@@ -393,7 +400,7 @@ def solve_stage(
     C, n = cells.center.shape
     first, price, spared = slice(start[0], start[1]), 0.0, np.zeros(C)
     if multipliers is not None:
-        layer = np.repeat(np.arange(len(nodes)), np.diff(start))
+        layer = _layers(packed)
         each = steps.prices(multipliers, spans, packed.change, layer)
         most_of = np.maximum.reduceat(each, start[:-1])
         price, spared = steps.rounded_price(most_of, multipliers), most_of[layer] - each

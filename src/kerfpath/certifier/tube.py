@@ -88,7 +88,7 @@ class Tube:
 
     def limits(self, steps: Steps, spans: Ints) -> Array:
         """Return bound (6) in the tube, as `Steps.changes`."""
-        return steps.changes(self.center, self.box, spans, np.arange(len(self.half)))
+        return steps.changes(self.center, self.box, spans)
 
     def bent(self, steps: Steps, spans: Ints) -> Array:
         """Return the most (M - 2, n) rad by which the means of two steps differ by (6)."""
@@ -262,7 +262,7 @@ def limit_share(q: Array, u: Array, spans: Ints, steps: Steps) -> float:
     rate, apart = u / spans[:, None], ((spans[:-1] + spans[1:]) / 2)[:, None]
     bent = np.diff(rate, axis=0) / apart
     fast = np.abs(rate / steps.velocity).max()
-    change = np.broadcast_to(steps.changes(q, 0.0, spans, np.arange(len(q))), q.shape)[1:-1]
+    change = np.broadcast_to(steps.changes(q, 0.0, spans), q.shape)[1:-1]
     return float(max(fast, np.abs(bent / change).max(initial=0.0)))
 
 

@@ -104,8 +104,9 @@ class Exploration:
     ) -> list[tuple[float, Course]]:
         """Return what courses are screened to each way, with scores, best first."""
         found, tally = self._courses.screened(courses, *ways), self._starts.tally
-        tally.screened += len(courses) * len(ways)
-        tally.dropped += len(courses) * len(ways) - len(found)
+        begun = len(courses) * len(ways)
+        tally.screened += begun
+        tally.dropped += begun - len(found)
         return found
 
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
