@@ -112,7 +112,7 @@ class Steps:
         """
         layer = np.arange(len(middle)) if layer is None else layer
         if self.everywhere is None or not len(self.table.joint_2):
-            return self.acceleration[None]
+            return self.acceleration[None].copy()  # writable always: one type for the kernels
         before, after = np.append(1, spans)[layer], np.append(spans, 1)[layer]
         factor = own = most_factors(self.table, middle - reach, middle + reach)
         for far in range(1, int(spans.max(initial=1))):
