@@ -151,6 +151,25 @@ def test_without_a_terminal_lines_tell_what_is_being_done(monkeypatch):
     assert said.getvalue() == ""
 
 
+def test_an_estimate_that_was_too_low_is_not_repeated(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(show_module, "LINE_SECONDS", 0.02)
+    monkeypatch.setattr(show_module, "monotonic", lambda: now)
+    said = io.StringIO()
+    with redirect_stderr(said), progress_bars() as progress:
+        progress("trim", 0, 4)
+        now = 10.0
+        progress("trim", 1, 4)
+        time.sleep(0.1)
+        now = 25.0
+        time.sleep(0.1)
+        now = 60.0
+        time.sleep(0.1)
+    assert "kerfpath: trim, 1 of 4 nodes, about 30 s left (10 s)\n" in said.getvalue()
+    assert "kerfpath: trim, 1 of 4 nodes, about 15 s left (25 s)\n" in said.getvalue()
+    assert "kerfpath: trim, 1 of 4 nodes (60 s)\n" in said.getvalue()
+
+
 def test_quiet_is_an_option_of_every_command(monkeypatch):
     assert run("--quiet", "robots", "--json").returncode == 0
     assert show_module.quiet.is_set()

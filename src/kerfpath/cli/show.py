@@ -213,23 +213,24 @@ def write_text(path: Path, text: str, option: str) -> None:
 @contextmanager
 def progress_lines(unit: str) -> Iterator[Progress]:
     """Give a `Progress` that prints a line every few seconds, for output without a terminal."""
-    state, begun, over = "", monotonic(), Event()
+    state, expected_end, begun, over = "", 0.0, monotonic(), Event()
     first: tuple[str, int, float] = "", 0, 0.0
 
     def take(what: str, done: int, total: int) -> None:
-        nonlocal state, first
+        nonlocal state, expected_end, first
         now = monotonic()
         if what != first[0]:
             first = what, done, now
         state = what + (f", {done} of {total} {unit}".rstrip() if total else "")
-        if done > first[1]:
-            left = (now - first[2]) * (total - done) / (done - first[1])
-            state += f", about {left:.0f} s left"
+        rate = (now - first[2]) / (done - first[1]) if done > first[1] else 0.0
+        expected_end = now + rate * (total - done)
 
     def repeat() -> None:
         while not over.wait(LINE_SECONDS):
+            now = monotonic()
+            left = f", about {expected_end - now:.0f} s left" if expected_end - now >= 1 else ""
             if state:
-                errors.print(f"kerfpath: {state} ({monotonic() - begun:.0f} s)")
+                errors.print(f"kerfpath: {state}{left} ({now - begun:.0f} s)")
 
     thread = Thread(target=repeat, daemon=True)
     thread.start()
