@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-
-import numpy as np
+from math import inf, isfinite, sqrt
 
 from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
@@ -25,9 +24,10 @@ from kerfpath.progress import Progress, no_progress
 HALVINGS, CLOSE = 4, 1.02
 """Most bisections between a speed that keeps the limits and one that was not found to; and the
 factor between them from which on there are none."""
-SLOWER = 0.97
-"""Factor on a speed that does not keep the limits, for the next one that is tried."""
-TRIES = 4
+SLOWER, MUCH_SLOWER = 0.97, 0.5
+"""Factors on a speed that does not keep the limits, for the next one that is tried: the largest,
+and the one where no run says more."""
+TRIES = 6
 
 
 def speed_as_run(
@@ -42,24 +42,22 @@ def speed_as_run(
     if not keeps_between_nodes(job):
         return None
     kept = partial(_kept, job, nodes, cell)
-    first = kept(fastest, draft=True) or kept(fastest)
-    low, high = fastest, fastest
-    if first is None or not first.done:
-        low = fastest * _share(first)
-        for _ in range(TRIES):
-            if _is_done(kept(low, draft=True)):
-                break
-            low, high = SLOWER * low, low
+    low = high = fastest
+    for _ in range(TRIES):
+        tried = kept(low, draft=True)
+        if _is_done(tried):
+            break
+        low, high = low * _share(tried), low
+    else:
+        return None
+    for _ in range(HALVINGS):
+        if high <= CLOSE * low:
+            break
+        middle = sqrt(low * high)
+        if _is_done(kept(middle, draft=True)):
+            low = middle
         else:
-            return None
-        for _ in range(HALVINGS):
-            if high <= CLOSE * low:
-                break
-            middle = (low + high) / 2
-            if _is_done(kept(middle, draft=True)):
-                low = middle
-            else:
-                high = middle
+            high = middle
     for _ in range(TRIES):
         if (found := kept(low)) is not None and found.done:
             return low, found
@@ -91,10 +89,8 @@ def _run_at(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Execut
 def _share(kept: Kept | None) -> float:
     """Return an estimate of the share of its speed at which a plan keeps the limits."""
     run: Executed | None = None if kept is None else kept.run
-    if run is None:
-        return SLOWER
-    slower = max(run.velocity_bound, np.sqrt(run.acceleration_bound))
-    return float(0.999 / slower) if np.isfinite(slower) else SLOWER
+    slower = inf if run is None else max(run.velocity_bound, sqrt(run.acceleration_bound))
+    return min(1 / slower, SLOWER) if isfinite(slower) else MUCH_SLOWER
 
 
 def _is_done(kept: Kept | None) -> bool:
