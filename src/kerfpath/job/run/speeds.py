@@ -42,26 +42,28 @@ def speed_as_run(
     if not keeps_between_nodes(job):
         return None
     kept = partial(_kept, job, nodes, cell)
-    low = high = fastest
+    low, high, drafted = fastest, fastest, True
     for _ in range(TRIES):
         tried = kept(low, draft=True)
         if _is_done(tried):
             break
-        low, high = low * _share(tried), low
+        low, high, drafted = low * _share(tried), low, tried is not None
     else:
         return None
     for _ in range(HALVINGS):
         if high <= CLOSE * low:
             break
         middle = sqrt(low * high)
-        if _is_done(kept(middle, draft=True)):
+        tried = kept(middle, draft=True)
+        if _is_done(tried):
             low = middle
         else:
-            high = middle
-    for _ in range(TRIES):
-        if (found := kept(low)) is not None and found.done:
-            return low, found
-        low = SLOWER * low
+            high, drafted = middle, tried is not None
+    # Where there is no draft there may be a plan.
+    without_draft = [high] if high > low and not drafted else []
+    for speed in without_draft + [low * SLOWER**i for i in range(TRIES)]:
+        if (found := kept(speed)) is not None and found.done:
+            return speed, found
     return None
 
 
