@@ -10,10 +10,13 @@ from kerfpath.planner import node_interval
 
 pytestmark = pytest.mark.usefixtures("explored")
 
-SEEDS = [0, 29, 192, 203]
+CASES = [
+    (0, ()), (29, ()), (192, ()), (203, ()), (334, ()), (28, ("as drawn", "reversed")),
+]  # fmt: skip
 """Tasks whose first paths, on coarse samples of gamma, lie in another valley than the best motion:
 in another posture, half a turn away, and in postures that two joints at their limits leave less
-than 4 degrees of gamma; they cost 0.6, 2.9, 10.4 and 2.6 % more."""
+than 4 degrees of gamma; they cost 0.6, 2.9, 10.4 and 2.6 % more. In the last two only the largest
+step counts: motions refined in some of the forms cost 1.3 and 2.6 % more."""
 
 
 def test_a_seed_decides_all_of_a_task():
@@ -55,9 +58,9 @@ def _steps(task):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_plan_costs_the_same_in_all_forms_of_its_task(seed):
-    costs = invariance.planned(seed)["costs"].values()
+@pytest.mark.parametrize(("seed", "forms"), CASES)
+def test_a_plan_costs_the_same_in_all_forms_of_its_task(seed, forms):
+    costs = invariance.planned(seed, forms)["costs"].values()
     assert None not in costs
     assert max(costs) <= min(costs) * (1 + invariance.TOLERANCE)
 

@@ -34,7 +34,8 @@ ROUNDS = 2
 """Times that the best motions are shaken, the second only if the first gained."""
 AGAIN, SAME_END = 3, 1e-4
 """Refinements that end at the best cost again, to this relative difference, from which on no more
-are made: motions that are not alike lead to it."""
+are made: motions that are not alike lead to it. The cost of the largest step alone says nothing of
+that, as many motions share the step."""
 SHAKEN = 2
 """Best motions that are shaken."""
 SAME_COST = 1e-3
@@ -58,7 +59,7 @@ class Exploration:
         self._starts, self._courses = starts, Courses(task)
         self._known: list[Course] = []
         self._begun: list[Course] = []
-        self._again = 0
+        self._again, self._costs_add_up = 0, task.settings.objective == "sum"
 
     def begin(self) -> None:
         """Refine the courses through the cheapest valleys that may lead to better motions."""
@@ -130,7 +131,7 @@ class Exploration:
                 postures.add(posture)
                 self._known.append(course)
                 found = self._starts.refine_course(self._courses.closed(course), score)
-                if found <= (1 + SAME_END) * best < np.inf:
+                if self._costs_add_up and found <= (1 + SAME_END) * best < np.inf:
                     self._again = self._again + 1 if found >= (1 - SAME_END) * best else 0
 
     @property

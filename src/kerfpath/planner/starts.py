@@ -29,8 +29,9 @@ from kerfpath.search import (
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma when a path between the samples is refined."""
-GAIN = 5e-3
-"""Relative gain that a refinement may reach beyond the cost of a course or a promised one."""
+GAIN, GAIN_OF_MAX = 5e-3, 3e-2
+"""Relative gain that a refinement may reach beyond the cost of a course or a promised one: of all
+steps together, and of the largest step alone."""
 FAR = 0.05
 """Relative cost above its score from which the refinement of a course is repeated from nearer the
 limits."""
@@ -155,8 +156,9 @@ class Starts:
         return self._is_hopeless(self._task.plan_at(*course, _CLAIM).cost)
 
     def _is_hopeless(self, cost: float) -> bool:
+        gain = GAIN_OF_MAX if self._task.settings.objective == "max" else GAIN
         best = self.best
-        return best is not None and cost * (1 - GAIN) >= best.cost_after
+        return best is not None and cost * (1 - gain) >= best.cost_after
 
     def refine_course(self, course: Course, score: float) -> float:
         """Refine a course whose cost is about `score`; if need be, first bring it near the limits.
