@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from scipy.spatial.transform import Rotation
 
 from conftest import pose
 from kerfpath import Contour, plan
@@ -16,7 +17,7 @@ from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.report import ContourSection, render
 from kerfpath.report.motion import joint_positions, limit_shares
-from kerfpath.report.scene import add_cell, poses_shown
+from kerfpath.report.scene import add_cell, poses_shown, scene
 from kerfpath.robots import carried
 from kerfpath.transfer import transfer_move
 
@@ -95,6 +96,17 @@ def test_the_scene_is_what_the_part_sees(shown):
             np.testing.assert_allclose(drawn[name][i], points * 1e3, atol=1e-3)
     clamp = surface(bodies["clamp"].shape)[0] - CENTRE
     np.testing.assert_allclose(drawn["clamp"][0], clamp * 1e3, atol=1e-3)
+
+
+@pytest.mark.parametrize(("turn", "drag"), [(0.0, "turntable"), (np.pi, "orbit")])
+def test_the_cell_stands_upright_whatever_way_up_the_part_is(arm, tool, turn, drag):
+    """A turntable of plotly would turn the z axis of the part upright, and the cell over."""
+    slab = box_between([-0.3, -0.3, -0.02], [0.3, 0.3, 0.0])
+    placement = pose(CENTRE, Rotation.from_euler("x", turn).as_matrix())
+    part = Mesh(vertices=slab.points, triangles=slab.triangles, name="slab")
+    cell = cell_of(arm, tool=tool, placement=placement, near_miss=1e-3, part=part)
+    seen = scene([], (slab.points, slab.triangles), cell).layout.scene
+    assert (seen.camera.up.z, seen.dragmode) == (np.cos(turn), drag)
 
 
 def test_a_whole_page_is_made(shown):

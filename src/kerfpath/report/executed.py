@@ -9,7 +9,17 @@ import numpy as np
 import plotly.graph_objects as go
 
 from kerfpath.arrays import Array, short_repr, spread
-from kerfpath.report.style import ACCENT, CHOSEN, FAINT, INK, axis, axis_title, base_layout, short
+from kerfpath.report.style import (
+    ACCENT,
+    CHOSEN,
+    FAINT,
+    INK,
+    axis,
+    axis_title,
+    base_layout,
+    seen_by,
+    short,
+)
 
 # -----------------------------------------------------------------------------
 # The path as it is executed beside the one that is drawn.
@@ -119,11 +129,10 @@ def enlarged(path: ExecutedPath) -> go.Figure:
             "aspectratio": {
                 name: float(f"{share:.3g}") for name, share in zip("xyz", shares, strict=True)
             },
-            "dragmode": "turntable",
             "xaxis": hidden,
             "yaxis": hidden,
             "zaxis": hidden,
-            "camera": _camera(path.nearest),
+            **seen_by(_camera(path.nearest)),
         },
     )
     return figure

@@ -15,7 +15,17 @@ from kerfpath.cell import Cell, surface
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.report.section import ContourSection
-from kerfpath.report.style import ACCENT, ALERT, CHOSEN, FAINT, GRID, INK, QUIET, base_layout
+from kerfpath.report.style import (
+    ACCENT,
+    ALERT,
+    CHOSEN,
+    FAINT,
+    GRID,
+    INK,
+    QUIET,
+    base_layout,
+    seen_by,
+)
 
 HEIGHT = 560
 AXES_DRAWN = 6, 48
@@ -88,8 +98,7 @@ def scene(
         scene={
             "aspectmode": "manual",
             "aspectratio": sides,
-            "dragmode": "turntable",
-            "camera": camera,
+            **seen_by(camera),
             "annotations": _labels(sections, places, numbered=bool(moves)),
             **{f"{a}axis": space_axis(a) for a in sides},
             **{f"{a}axis": space_axis(a) | UNSAID for a in sides if sides[a] < flat},

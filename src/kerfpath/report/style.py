@@ -82,6 +82,11 @@ def base_layout(height: int, **more: Any) -> go.Layout:
     return go.Layout(**(look | more))
 
 
+def seen_by(camera: dict[str, Any]) -> dict[str, Any]:
+    """Return a scene's camera, and a way of dragging that keeps it: turntables turn z upright."""
+    return {"camera": camera, "dragmode": "turntable" if camera["up"]["z"] == 1 else "orbit"}
+
+
 def axis(**more: Any) -> dict[str, object]:
     """Return the look of a plot axis."""
     return {
