@@ -45,6 +45,24 @@ def test_faults_are_drawn_apart_and_names_are_escaped():
     assert figure["layout"]["scene"]["annotations"][0]["text"] == "&lt;b&gt;"
 
 
+def test_names_lie_beside_each_other():
+    """Of nine loops that begin within a millimetre in a plate of a metre; letters are 8 px wide."""
+    plate = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    loops = [DrawnLoop(name="plate", kind="outer", points=plate[[0, 1, 2, 3, 0]])]
+    for k in range(9):
+        hole = (0.5 + 1e-4 * k + 0.1 * (plate - 0.5)) * [1, 1, 0]
+        loops.append(DrawnLoop(name=f"hole{k}", kind="inner", points=hole[[2, 3, 0, 1, 2]]))
+    (figure,) = figures(render_drawing("plate", loops, mesh=(plate, np.zeros((0, 3), np.int64))))
+    seen = figure["layout"]["scene"]
+    assert seen["dragmode"] == "pan"
+    names = [each for each in seen["annotations"] if each["text"] != "plate"]
+    assert len(names) == 9
+    for one in names:
+        for other in names:
+            apart = abs(one["ax"] - other["ax"]) > 8 * 5 or abs(one["ay"] - other["ay"]) > 13
+            assert one is other or apart
+
+
 def test_bad_drawings_end_with_exit_code_2(drawings):
     (drawings / "bad.csv").write_text("1,2\n")
     result = run("contours", drawings / "bad.csv", "--unit", "mm")

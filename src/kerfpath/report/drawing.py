@@ -12,8 +12,17 @@ from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.report.page import render_page
-from kerfpath.report.scene import add_part, checked, space_axis, xyz
-from kerfpath.report.style import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
+from kerfpath.report.scene import (
+    FAR,
+    UNSAID,
+    add_part,
+    checked,
+    first_view,
+    labels_apart,
+    space_axis,
+    xyz,
+)
+from kerfpath.report.style import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout, seen_by
 
 HEIGHT = 720
 LABELS = 80
@@ -93,56 +102,45 @@ def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go
                     colour = ALERT if fault else FAINT if aside else COLOURS[kind]
                     what = caption + (" of single faces and cut edges" if aside else "")
                     _add(figure, alike, what + (" with faults" if fault else ""), colour, aside)
+    points = [vertices, *(floats(loop.points, "points", (None, 3)) for loop in loops)]
+    named = [loop for loop in loops if not loop.aside][:LABELS]
+    labels = [
+        (loop.points[0], loop.name, ALERT if loop.fault else COLOURS[loop.kind]) for loop in named
+    ]
     figure.update_layout(
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        scene=_view(
-            np.vstack([vertices, *(floats(loop.points, "points", (None, 3)) for loop in loops)])
-        )
-        | {"annotations": _labels([loop for loop in loops if not loop.aside][:LABELS])},
+        margin={"l": 0, "r": 0, "t": 0, "b": 0}, scene=_view(np.vstack(points), labels)
     )
     return figure
 
 
-def _view(points: Array) -> dict[str, object]:
+def _view(points: Array, labels: Sequence[tuple[Array, str, str]]) -> dict[str, object]:
     """Return a scene around `points` (m), to scale; a flat drawing is seen from above."""
     low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
     size = float((high - low).max())
     # plotly has no scale for an axis of zero length.
     half = np.maximum((high - low) * 0.55, 0.05 * size)
     middle, is_flat = (low + high) / 2, bool(high[2] - low[2] < 1e-3 * size)
-    look = {"eye": {"x": 0.0, "y": 0.0, "z": 1.3}, "up": {"x": 0.0, "y": 1.0, "z": 0.0}}
-    if not is_flat:
-        look = {"eye": {"x": 0.9, "y": -1.3, "z": 1.0}}
+    eye = np.array([0.0, 0.0, 1.0] if is_flat else [0.9, -1.3, 1.0])
+    camera = {
+        "eye": dict(zip("xyz", (FAR * eye / np.linalg.norm(eye)).tolist(), strict=True)),
+        "up": {"x": 0.0, "y": float(is_flat), "z": float(not is_flat)},
+        "projection": {"type": "orthographic"},
+    }
+    ends = np.array([middle - half, middle + half])
+    sides, places = first_view(ends, camera, HEIGHT)
     return {
         "aspectmode": "manual",
-        "aspectratio": dict(zip("xyz", (1.5 * half / half.max()).tolist(), strict=True)),
-        "dragmode": "turntable" if not is_flat else "pan",
-        "camera": look | {"projection": {"type": "orthographic"}},
+        "aspectratio": sides,
+        **seen_by(camera),
+        **({"dragmode": "pan"} if is_flat else {}),
+        "annotations": labels_apart(labels, places),
         **{
-            f"{a}axis": space_axis(a) | {"range": [float(m - h), float(m + h)]}
-            for a, m, h in zip("xyz", middle, half, strict=True)
+            f"{a}axis": space_axis(a)
+            | {"range": ends[:, i].tolist()}
+            | (UNSAID if is_flat and a == "z" else {})
+            for i, a in enumerate("xyz")
         },
     }
-
-
-def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, object]]:
-    """Return the names at the starts of loops, in front of the part, at alternating heights."""
-    return [
-        {
-            **dict(zip("xyz", (loop.points[0] * 1e3).tolist(), strict=True)),
-            "text": escape(loop.name),
-            "font": {"size": 12, "color": ALERT if loop.fault else COLOURS[loop.kind]},
-            "bgcolor": "rgba(255, 255, 255, 0.8)",
-            "showarrow": True,
-            "arrowhead": 0,
-            "arrowwidth": 1,
-            "arrowcolor": FAINT,
-            "ax": 24,
-            "ay": (-24, 24, -48, 48)[i % 4],
-            "xanchor": "left",
-        }
-        for i, loop in enumerate(loops)
-    ]
 
 
 def _add(

@@ -41,8 +41,10 @@ CELL_HEIGHT = 760
 """Height of the figure, px; a cell is larger than a part."""
 FILL = 0.9
 """Half the height that the scene has at most in the first view, in plotly's units."""
+FAR = 1.85
+"""Distance of the camera from the middle of a scene, in plotly's units."""
 UNIT = 0.423
-"""plotly's unit on the screen, as a share of the height of a figure, with the camera of a scene."""
+"""plotly's unit on the screen, as a share of the height of a figure, seen from so far."""
 WIDE = 1.2
 """Width of the narrowest figure, in heights."""
 FLAT = 0.1
@@ -91,7 +93,7 @@ def scene(
         figure.layout.height = CELL_HEIGHT
         plans = [section.plan for section in sections if section.plan is not None]
         add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
-    sides, places = _first_view(figure, camera)
+    sides, places = first_view(_ends(figure), camera, figure.layout.height)
     flat = FLAT * max(sides.values())
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
@@ -166,18 +168,8 @@ def add_cell(
     figure.update_layout(sliders=[{"steps": steps, **look}])
 
 
-def _first_view(
-    figure: go.Figure, camera: Mapping[str, Mapping[str, float]]
-) -> tuple[dict[str, float], Callable[[Array], Array]]:
-    """Return how the scene is seen first: to one scale, and whole, however flat it is.
-
-    Returns
-    -------
-    dict of str to float
-        Sides of the box around it, as plotly takes them.
-    callable
-        It maps points (P, 3) mm to places (P, 2) px from the middle of the figure, right and down.
-    """
+def _ends(figure: go.Figure) -> Array:
+    """Return the lowest and highest coordinates (2, 3) of what a figure shows at first."""
     ends = []
     for coordinate in "xyz":
         # Breaks in lines and the unset cursor are NaN.
@@ -185,7 +177,31 @@ def _first_view(
         points = np.concatenate(drawn)
         points = points[np.isfinite(points)]
         ends.append((points.min(), points.max()) if points.size else (0.0, 1.0))
-    low, high = np.array(ends).T
+    return np.array(ends).T
+
+
+def first_view(
+    ends: Array, camera: Mapping[str, Mapping[str, float]], height: float
+) -> tuple[dict[str, float], Callable[[Array], Array]]:
+    """Return how a scene is seen first: to one scale, and whole, however flat it is.
+
+    Parameters
+    ----------
+    ends : (2, 3) mm
+        Corners of the box around it, the lowest first.
+    camera : mapping
+        As of plotly; its eye is `FAR` from the middle.
+    height : float px
+        That of the figure.
+
+    Returns
+    -------
+    dict of str to float
+        Sides of the box, as plotly takes them.
+    callable
+        It maps points (P, 3) mm to places (P, 2) px from the middle of the figure, right and down.
+    """
+    low, high = ends
     towards, up = (np.array([camera[key][a] for a in "xyz"]) for key in ("eye", "up"))
     right = np.cross(up, towards)
     ways = np.array([right, np.cross(towards, right)])
@@ -193,7 +209,7 @@ def _first_view(
     # Half the width and height of the box as the camera sees it.
     across, along = np.abs(ways) @ (high - low) / 2
     scale = FILL / max(across / WIDE, along)
-    pixels = UNIT * scale * figure.layout.height * np.array([[1.0], [-1.0]]) * ways
+    pixels = UNIT * scale * height * np.array([[1.0], [-1.0]]) * ways
 
     def places(points: Array) -> Array:
         return np.asarray((points - (low + high) / 2) @ pixels.T)
@@ -313,8 +329,6 @@ def _labels(
     """Return the names of contours at their starts, and the first failure of each failed one.
 
     If they are `numbered`, names begin with the place of each in the order of cutting.
-
-    In the first view they lie beside each other and beside all starts, where there is room.
     """
     named = sections if len(sections) <= LABELS else ()
     labels = [
@@ -323,6 +337,21 @@ def _labels(
     ]
     failed = [section for section in sections if section.marks][:LABELS]
     labels += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
+    return labels_apart(labels, places)
+
+
+def labels_apart(
+    labels: Sequence[tuple[Array, str, str]], places: Callable[[Array], Array]
+) -> list[dict[str, object]]:
+    """Return labels of places in a scene, beside each other where there is room in the first view.
+
+    Parameters
+    ----------
+    labels : sequence of (place (3,) m, text, colour)
+        Texts lie beside all places, too.
+    places : callable
+        As `first_view` returns it.
+    """
     if not labels:
         return []
     at = places(np.array([point for point, _, _ in labels]) * 1e3)
@@ -376,7 +405,7 @@ def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, 
     if np.linalg.norm(towards) < 0.3:
         towards = np.zeros(3)
     eye = towards / max(1.0, float(np.linalg.norm(towards))) + turn @ np.array([0.55, -0.75, 0.45])
-    eye *= 1.85 / float(np.linalg.norm(eye))
+    eye *= FAR / float(np.linalg.norm(eye))
     return {
         "eye": dict(zip("xyz", np.round(eye, 4).tolist(), strict=True)),
         "up": dict(zip("xyz", np.round(turn[:, 2], 4).tolist(), strict=True)),
