@@ -41,7 +41,7 @@ def test_faults_are_drawn_apart_and_names_are_escaped():
     page = render_drawing("a & b", [loop], mesh=([[0, 0, 0]], [[0, 0, 0]]))
     assert "<h1>a &amp; b</h1>" in page
     (figure,) = figures(page)
-    assert "1 trim lines with faults" in [trace["name"] for trace in figure["data"]]
+    assert "1 trim line with faults" in [trace["name"] for trace in figure["data"]]
     assert figure["layout"]["scene"]["annotations"][0]["text"] == "&lt;b&gt;"
 
 

@@ -188,9 +188,10 @@ class CollisionFreeSearch:
         seen, clear = self._checker, f"{claim}, clear in the cell{self._but}"
         if not seen.asked:  # a motion found along some of the nodes is checked as a whole
             return clear
+        searches = "1 search" if self._known.searches == 1 else f"{self._known.searches} searches"
         return (
             f"{clear}: {seen.asked} of {len(self._known.cost)} poses and "
-            f"{seen.motions_asked} motions checked in {self._known.searches} searches, "
+            f"{seen.motions_asked} motions checked in {searches}, "
             f"distances computed at {seen.measured} poses and on {seen.motions_measured} motions"
         )
 

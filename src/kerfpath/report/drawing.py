@@ -28,7 +28,7 @@ HEIGHT = 720
 LABELS = 80
 """Number of names that are drawn; the others show on hover."""
 COLOURS = {"outer": ACCENT, "inner": JOINT_COLOURS[0], "open": JOINT_COLOURS[4]}
-CAPTIONS = {"outer": "trim lines", "inner": "holes", "open": "open lines"}
+CAPTIONS = {"outer": "trim line", "inner": "hole", "open": "open line"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +100,8 @@ def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go
                 ]
                 if alike:
                     colour = ALERT if fault else FAINT if aside else COLOURS[kind]
-                    what = caption + (" of single faces and cut edges" if aside else "")
+                    what = caption + ("s" if len(alike) > 1 else "")
+                    what += " of single faces and cut edges" if aside else ""
                     _add(figure, alike, what + (" with faults" if fault else ""), colour, aside)
     points = [vertices, *(floats(loop.points, "points", (None, 3)) for loop in loops)]
     named = [loop for loop in loops if not loop.aside][:LABELS]
